@@ -1,0 +1,7 @@
+"""Everything that drives the crane of `crane_env`: `make_controller` builds one by its name."""
+
+from __future__ import annotations
+
+from baselines.registry import CONTROLLERS, make_controller
+
+__all__ = ["CONTROLLERS", "make_controller"]

@@ -1,0 +1,167 @@
+"""Controller: what drives the trolley, and the predictive controllers' common conduct.
+
+A controller is built from nominal `CraneParameters` and sees observations only.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.mpc_settings import MpcSettings
+from crane_env.observation import Observation
+from crane_env.parameters import CraneParameters
+
+
+class Controller(ABC):
+    """Anything that answers an observation with a trolley acceleration."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Forgets the last episode."""
+
+    @abstractmethod
+    def act(self, observation: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Trolley acceleration [m/s^2], shape (1,), for an observation, shape (8,).
+
+        Raises:
+            ValueError: the observation has the wrong shape or an entry that is not finite.
+        """
+
+
+@dataclass(frozen=True)
+class SolverStatistics:
+    """What the solver of a predictive controller did since its reset.
+
+    Attributes:
+        solves: optimisation problems posed.
+        iterations: solver iterations, all solves together.
+        failures: solves without a usable plan; the fallback acted instead.
+        longest_failure_run: most failures in a row.
+        braking_steps: failures that outlived the last plan, so that the crane was braked.
+    """
+
+    solves: int = 0
+    iterations: int = 0
+    failures: int = 0
+    longest_failure_run: int = 0
+    braking_steps: int = 0
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Answer of a solver.
+
+    Attributes:
+        moves: trolley accelerations u_0 ... u_{N_c - 1} [m/s^2], shape (N_c,); None if it failed.
+        iterations: solver iterations spent.
+    """
+
+    moves: NDArray[np.float64] | None
+    iterations: int
+
+
+def finite_observation(array: NDArray[np.float64]) -> Observation:
+    """Names the entries of an observation and refuses poisoned ones.
+
+    Raises:
+        ValueError: the wrong number of entries, or one that is not finite.
+    """
+    observation = Observation.of(array)
+    if not all(map(math.isfinite, observation)):
+        bad = [name for name, x in zip(observation._fields, observation, strict=True)
+               if not math.isfinite(x)]
+        raise ValueError(f"The observation's {bad[0]} is not finite; act() needs real numbers.")
+    return observation
+
+
+class PredictiveController(Controller):
+    """Receding horizon: plan N_c moves, apply the first, plan again.
+
+    A failed solve is data, not a crash: the previous plan, shifted by the steps since, acts in its
+    place; when that is used up the trolley is braked to rest within the acceleration limits. All
+    of it is counted in `statistics`.
+
+    Args:
+        crane: nominal parameters; the true crane may differ.
+        settings: the optimal control problem.
+    """
+
+    def __init__(self, crane: CraneParameters, settings: MpcSettings) -> None:
+        self.crane = crane
+        self.settings = settings
+        self._acceleration_min, self._acceleration_max = settings.acceleration_range(crane)
+        self.reset()
+
+    @final
+    def reset(self) -> None:
+        """Forgets the last plan and the statistics."""
+        self._moves: NDArray[np.float64] | None = None
+        self._moves_used = 0
+        self._solves = 0
+        self._iterations = 0
+        self._failures = 0
+        self._failure_run = 0
+        self._longest_failure_run = 0
+        self._braking_steps = 0
+
+    @final
+    def act(self, observation: NDArray[np.float64]) -> NDArray[np.float64]:
+        """First move of a new plan; see `Controller.act`."""
+        measured = finite_observation(observation)
+        plan = self._plan(measured, self._shifted_moves())
+        self._solves += 1
+        self._iterations += plan.iterations
+        if plan.moves is not None:
+            self._moves = plan.moves
+            self._moves_used = 0
+            self._failure_run = 0
+        else:
+            self._failures += 1
+            self._failure_run += 1
+            self._longest_failure_run = max(self._longest_failure_run, self._failure_run)
+        if self._moves is not None and self._moves_used < len(self._moves):
+            acceleration = float(self._moves[self._moves_used])
+            self._moves_used += 1
+        else:
+            self._braking_steps += 1
+            acceleration = -measured.trolley_velocity / self.crane.control_period
+        low, high = self._acceleration_min, self._acceleration_max
+        return np.array([min(max(acceleration, low), high)])
+
+    @property
+    @final
+    def statistics(self) -> SolverStatistics:
+        """What the solver did since the last reset."""
+        return SolverStatistics(
+            solves=self._solves,
+            iterations=self._iterations,
+            failures=self._failures,
+            longest_failure_run=self._longest_failure_run,
+            braking_steps=self._braking_steps,
+        )
+
+    @abstractmethod
+    def _plan(self, observation: Observation, shifted_moves: NDArray[np.float64]) -> Plan:
+        """Solves the optimal control problem from a finite observation.
+
+        Args:
+            observation: the measured state and references.
+            shifted_moves: the last plan shifted to now, its last move repeated, shape (N_c,)
+                [m/s^2]; zeros after a reset.
+        """
+
+    def _shifted_moves(self) -> NDArray[np.float64]:
+        count = self.settings.control_horizon
+        if self._moves is None:
+            return np.zeros(count)
+        first = min(self._moves_used, count - 1)
+        shifted = np.empty(count)
+        shifted[: count - first] = self._moves[first:]
+        shifted[count - first :] = self._moves[-1]
+        return shifted

@@ -1,0 +1,41 @@
+"""Kinematics of the payload: its position and velocity from trolley, cable and sway.
+
+All functions take floats or arrays of equal shape, in SI units, and return the same.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+Scalars = TypeVar("Scalars", float, NDArray[np.float64])
+
+
+def sway_displacement(cable_length: Scalars, sway_angle: Scalars) -> Scalars:
+    """Payload position minus trolley position, l sin(theta) [m]."""
+    return cast("Scalars", cable_length * np.sin(sway_angle))
+
+
+def payload_position(
+    trolley_position: Scalars, cable_length: Scalars, sway_angle: Scalars
+) -> Scalars:
+    """x_p = s + l sin(theta) [m]."""
+    return trolley_position + sway_displacement(cable_length, sway_angle)
+
+
+def payload_velocity(
+    trolley_velocity: Scalars,
+    cable_length: Scalars,
+    cable_rate: Scalars,
+    sway_angle: Scalars,
+    sway_rate: Scalars,
+) -> Scalars:
+    """y = s' + l theta' cos(theta) + l' sin(theta) [m/s], the paper's controlled variable."""
+    return cast(
+        "Scalars",
+        trolley_velocity
+        + cable_length * sway_rate * np.cos(sway_angle)
+        + cable_rate * np.sin(sway_angle),
+    )

@@ -1,0 +1,114 @@
+"""Operator of the crane: a person with a pendant, seen as buttons over time.
+
+An operator is anything with `reset` and `press`. Most operators do not look at the payload: they
+follow a *program*, a description from which a sequence of timed button events is drawn at reset.
+`ScheduledOperator` plays such a sequence: a button event at time t counts from the first control
+step at or after t.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from crane_env.observation import CraneState
+from crane_env.parameters import CraneParameters
+
+EVENT_TOLERANCE = 1e-9
+"""Events this close after a control step count at it: rounding of step times [s]."""
+
+
+class Buttons(NamedTuple):
+    """The pendant's four buttons; True while pressed.
+
+    Opposite buttons are interlocked as on a real pendant: with both pressed, neither acts.
+    """
+
+    forward: bool = False
+    backward: bool = False
+    up: bool = False
+    down: bool = False
+
+    @property
+    def travel(self) -> int:
+        """+1 forward, -1 backward, 0 none or both."""
+        return int(self.forward) - int(self.backward)
+
+    @property
+    def hoist(self) -> int:
+        """Direction of the cable: -1 up (shortens), +1 down (lengthens), 0 none or both."""
+        return int(self.down) - int(self.up)
+
+
+RELEASED = Buttons()
+
+
+class ButtonEvent(NamedTuple):
+    """From `time` [s] on, exactly `buttons` are pressed."""
+
+    time: float
+    buttons: Buttons
+
+
+class Operator(Protocol):
+    """Whoever holds the pendant."""
+
+    def reset(
+        self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters
+    ) -> None:
+        """Begins an episode.
+
+        Args:
+            rng: the operator's own generator for this episode.
+            start: state of the crane at time 0.
+            parameters: the crane that is operated.
+        """
+
+    def press(self, time: float, state: CraneState) -> Buttons:
+        """Buttons pressed during the control period that begins at `time` [s].
+
+        Called once a control step, in order.
+        """
+
+
+class Program(Protocol):
+    """Description of button sequences, from which one is drawn for each episode."""
+
+    @property
+    def name(self) -> str:
+        """The name that `make_operator` knows the program by."""
+
+    def events(
+        self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters
+    ) -> Iterator[ButtonEvent]:
+        """Events of one episode in order of time, finite or not.
+
+        The iterator can be pickled and deep-copied, so that an episode can be too.
+        """
+
+
+class ScheduledOperator:
+    """Operator that plays the events of a program and does not look at the crane."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self._events: Iterator[ButtonEvent] = iter(())
+        self._next: ButtonEvent | None = None
+        self._pressed = RELEASED
+
+    def reset(
+        self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters
+    ) -> None:
+        """Draws the episode's events; see `Operator.reset`."""
+        self._events = self.program.events(rng, start, parameters)
+        self._next = next(self._events, None)
+        self._pressed = RELEASED
+
+    def press(self, time: float, state: CraneState) -> Buttons:
+        """Buttons at `time` [s]; see `Operator.press`."""
+        while self._next is not None and self._next.time <= time + EVENT_TOLERANCE:
+            self._pressed = self._next.buttons
+            self._next = next(self._events, None)
+        return self._pressed

@@ -1,0 +1,100 @@
+"""Stage cost of eq. (6): what the MPCs minimise and what the reward is the negative of.
+
+    (y - w)^2 + lambda_1 d^2 + lambda_u u^2
+
+with payload velocity y, travel reference w, trolley acceleration u and the sway term d:
+
+    "displacement"  d = l sin(theta)    payload minus trolley position, as the paper's prose says
+    "angle"         d = theta
+    "printed"       d = theta - w       eq. (6) to the letter, which mixes rad and m/s
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, get_args
+
+from crane_env.kinematics import Scalars, sway_displacement
+
+SwayTerm = Literal["displacement", "angle", "printed"]
+
+
+class CostTerms(NamedTuple):
+    """The weighted terms of one stage; floats or arrays, [m^2/s^2] up to the weights' units."""
+
+    tracking: Any
+    sway: Any
+    acceleration: Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageCost:
+    """Weights of eq. (6); the defaults are the paper's (section V).
+
+    Attributes:
+        sway_weight: lambda_1 [1/s^2 for a displacement].
+        acceleration_weight: lambda_u [s^2].
+        sway_term: which quantity lambda_1 weighs, see the top of this file.
+
+    Raises:
+        ValueError: a weight that is negative or not finite, or an unknown sway term.
+    """
+
+    sway_weight: float = 1.0
+    acceleration_weight: float = 0.2
+    sway_term: SwayTerm = "displacement"
+
+    def __post_init__(self) -> None:
+        """Refuses weights that make no cost."""
+        for name in ("sway_weight", "acceleration_weight"):
+            value = getattr(self, name)
+            if not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0.0:
+                raise ValueError(f"{name} must be zero or a positive number, not {value!r}.")
+        if self.sway_term not in get_args(SwayTerm):
+            raise ValueError(
+                f"Unknown sway_term {self.sway_term!r}; valid: {', '.join(get_args(SwayTerm))}."
+            )
+
+    @classmethod
+    def of(cls, value: StageCost | Mapping[str, Any] | None) -> StageCost:
+        """Reads a stage cost from itself, a mapping of its fields, or None (the paper's).
+
+        Raises:
+            ValueError: an unknown field, or a value out of range.
+        """
+        if value is None:
+            return cls()
+        if isinstance(value, cls):
+            return value
+        if not isinstance(value, Mapping):
+            raise ValueError(
+                f"A stage cost must be a StageCost or a mapping, not {type(value).__name__}."
+            )
+        unknown = sorted(set(value) - set(cls.__dataclass_fields__))
+        if unknown:
+            valid = ", ".join(cls.__dataclass_fields__)
+            raise ValueError(f"Unknown stage cost field {unknown[0]!r}; valid: {valid}.")
+        return cls(**value)
+
+    def terms(
+        self,
+        payload_velocity: Scalars,
+        travel_reference: Scalars,
+        cable_length: Scalars,
+        sway_angle: Scalars,
+        acceleration: Scalars,
+    ) -> CostTerms:
+        """Weighted terms of one stage (floats) or of many (arrays of equal shape); all >= 0."""
+        if self.sway_term == "displacement":
+            sway = sway_displacement(cable_length, sway_angle)
+        elif self.sway_term == "angle":
+            sway = sway_angle
+        else:
+            sway = sway_angle - travel_reference
+        return CostTerms(
+            tracking=(payload_velocity - travel_reference) ** 2,
+            sway=self.sway_weight * sway**2,
+            acceleration=self.acceleration_weight * acceleration**2,
+        )
