@@ -32,7 +32,7 @@ def payload_velocity(
     sway_angle: Scalars,
     sway_rate: Scalars,
 ) -> Scalars:
-    """y = s' + l theta' cos(theta) + l' sin(theta) [m/s], the paper's controlled variable."""
+    """Velocity y = s' + l theta' cos(theta) + l' sin(theta) [m/s], the paper's controlled variable."""
     return cast(
         "Scalars",
         trolley_velocity
