@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -12,7 +12,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from crane_env.kinematics import payload_position, payload_velocity
-from crane_env.observation import CraneState, Observation, observation_space
+from crane_env.observation import CraneState, observation_space
 from crane_env.operator import ButtonEvent, Buttons, Operator, Program
 from crane_env.operators import make_operator
 from crane_env.parameters import CraneParameters
@@ -27,8 +27,11 @@ OperatorSpec = str | Mapping[str, Any] | Program | Operator | Sequence[ButtonEve
 RESET_STATE = ("cable_length", "sway_angle", "sway_rate", "trolley_position", "trolley_velocity")
 """Options of `reset` that place the crane; see `Plant.reset` for units and ranges."""
 
+ACTION_ROUNDING = 1e-6
+"""Share of the limit by which an action may exceed it by rounding to float32."""
 
-class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
+
+class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     """Operator-in-the-loop overhead crane.
 
     ## Description
@@ -39,7 +42,8 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
 
     ## Action space
 
-    `Box(-a_max, a_max, (1,), float64)`: trolley acceleration [m/s^2], held for one control period.
+    `Box(-a_max, a_max, (1,), float32)`: trolley acceleration [m/s^2], held for one control period;
+    actions of any real dtype are taken unrounded.
     An action beyond the limits is clipped, as the drive would, and reported in `info`. An action
     of another shape or one that is not finite is refused; the state stays as it was.
 
@@ -72,15 +76,16 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
 
     ## Info
 
-    | key                   | unit | meaning                                                         |
-    |-----------------------|------|-----------------------------------------------------------------|
-    | payload_position      | m    | s + l sin(theta)                                                |
-    | payload_velocity      | m/s  | s' + l theta' cos(theta) + l' sin(theta)                        |
-    | cable_tension         | N    | 0 when slack                                                    |
-    | buttons               | -    | forward, backward, up, down as pressed; int8, shape (4,)        |
-    | acceleration          | m/s^2| what the drive did (`step` only)                                |
-    | action_clipped        | -    | the action was beyond the limits (`step` only)                  |
-    | drive_limited         | -    | speed limit or limit switch overruled the action (`step` only)  |
+    | key                 | unit   | meaning                                            |
+    |---------------------|--------|----------------------------------------------------|
+    | payload_position    | m      | s + l sin(theta)                                   |
+    | payload_velocity    | m/s    | s' + l theta' cos(theta) + l' sin(theta)           |
+    | cable_tension       | N      | 0 when slack                                       |
+    | buttons             | -      | `Buttons` as pressed                               |
+    | acceleration        | m/s^2  | what the drive did (`step` only)                   |
+    | action_clipped      | -      | the action was beyond the limits (`step` only)     |
+    | drive_limited       | -      | speed limit or limit switch overruled the action   |
+    | reward_tracking ... | m^2/s  | the three terms of the reward (`step` only)        |
 
     ## Starting state
 
@@ -104,7 +109,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
         ValueError: an unknown name or a value out of range; the message says what is allowed.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+    metadata: dict[str, Any] = {  # noqa: RUF012
         "render_modes": ["human", "rgb_array"],
         "render_fps": 50,
     }
@@ -130,16 +135,15 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
         self.render_mode = render_mode
         self.render_width = render_width
         self.render_height = render_height
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.parameters.control_period)}
+        frames = round(1.0 / self.parameters.control_period)
+        self.metadata = {**self.metadata, "render_fps": frames}
         limit = self.parameters.acceleration_max
-        self.action_space = Box(-limit, limit, (1,), dtype=np.float64)
+        self.action_space = Box(-limit, limit, (1,), dtype=np.float32)
         self.observation_space = observation_space(self.parameters)
         self._default_operator = make_operator(operator)
         self._operator = self._default_operator
         self._step_index = 0
-        self._buttons = Buttons()
-        self._travel_reference = 0.0
-        self._hoist_reference = 0.0
+        self._show(Buttons())
         self._renderer: CraneRenderer | None = None
 
     def reset(
@@ -177,7 +181,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
         return self._observation(state), self._info(state)
 
     def step(
-        self, action: NDArray[np.float64]
+        self, action: NDArray[Any]
     ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
         """Drives the trolley with an acceleration for one control period.
 
@@ -196,7 +200,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
         state = self.plant.state()
         self._read_buttons(state)
         info = self._info(state)
-        terms = self.cost.terms(
+        tracking, sway, effort = self.cost.terms(
             info["payload_velocity"],
             reference,
             state.cable_length,
@@ -204,19 +208,19 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
             drive.acceleration,
         )
         period = self.parameters.control_period
-        tracking, sway, acceleration = (-period * term for term in terms)
+        tracking, sway, effort = -period * tracking, -period * sway, -period * effort
         info["acceleration"] = drive.acceleration
-        info["action_clipped"] = command != asked
+        info["action_clipped"] = abs(asked - command) > ACTION_ROUNDING * limit
         info["drive_limited"] = drive.limited
         info["reward_tracking"] = tracking
         info["reward_sway"] = sway
-        info["reward_acceleration"] = acceleration
+        info["reward_acceleration"] = effort
         if self.render_mode == "human":
             self.render()
-        reward = tracking + sway + acceleration
+        reward = tracking + sway + effort
         return self._observation(state), reward, False, False, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Draws the crane, the pendant, and reference and payload velocity.
 
         Returns:
@@ -251,7 +255,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
         """Everything but the graphics: a copy continues bit for bit and draws for itself."""
         return {**self.__dict__, "_renderer": None}
 
-    def _checked(self, action: NDArray[np.float64]) -> float:
+    def _checked(self, action: NDArray[Any]) -> float:
         array = np.asarray(action, dtype=np.float64)
         if array.shape != (1,):
             raise ValueError(f"An action has shape (1,), not {array.shape}.")
@@ -262,12 +266,17 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
 
     def _read_buttons(self, state: CraneState) -> None:
         time = self._step_index * self.parameters.control_period
-        self._buttons = self._operator.press(time, state)
-        self._travel_reference = self._buttons.travel * self.parameters.travel_speed
-        self._hoist_reference = self._buttons.hoist * self.parameters.hoist_speed
+        buttons = self._operator.press(time, state)
+        if buttons is not self._buttons:
+            self._show(buttons)
+
+    def _show(self, buttons: Buttons) -> None:
+        self._buttons = buttons
+        self._travel_reference = buttons.travel * self.parameters.travel_speed
+        self._hoist_reference = buttons.hoist * self.parameters.hoist_speed
 
     def _observation(self, state: CraneState) -> NDArray[np.float64]:
-        return np.array(Observation(*state, self._travel_reference, self._hoist_reference))
+        return np.array((*state, self._travel_reference, self._hoist_reference))
 
     def _info(self, state: CraneState) -> dict[str, Any]:
         return {
@@ -282,5 +291,5 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
                 state.sway_rate,
             ),
             "cable_tension": self.plant.cable_tension,
-            "buttons": np.array(self._buttons, dtype=np.int8),
+            "buttons": self._buttons,
         }

@@ -199,7 +199,7 @@ def run_episode(
     seen = dict(zip(Observation._fields, np.array(observations).T.copy(), strict=True))
     count = len(rewards)
     return Trajectory(
-        time=np.arange(count) * parameters.control_period,
+        time=np.arange(count, dtype=np.float64) * parameters.control_period,
         **seen,
         **{name: np.array([row[name] for row in before[:count]]) for name in SEEN_BEFORE},
         action=np.array(actions, dtype=np.float64).reshape(count),

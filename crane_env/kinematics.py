@@ -5,7 +5,8 @@ All functions take floats or arrays of equal shape, in SI units, and return the 
 
 from __future__ import annotations
 
-from typing import TypeVar, cast
+import math
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,19 @@ from numpy.typing import NDArray
 Scalars = TypeVar("Scalars", float, NDArray[np.float64])
 
 
+def sine(angle: Scalars) -> Scalars:
+    """Sine of an angle [rad]; of a float by `math`, ten times faster than by numpy."""
+    return math.sin(angle) if isinstance(angle, float) else np.sin(angle)
+
+
+def cosine(angle: Scalars) -> Scalars:
+    """Cosine of an angle [rad]; see `sine`."""
+    return math.cos(angle) if isinstance(angle, float) else np.cos(angle)
+
+
 def sway_displacement(cable_length: Scalars, sway_angle: Scalars) -> Scalars:
     """Payload position minus trolley position, l sin(theta) [m]."""
-    return cast("Scalars", cable_length * np.sin(sway_angle))
+    return cable_length * sine(sway_angle)
 
 
 def payload_position(
@@ -32,10 +43,9 @@ def payload_velocity(
     sway_angle: Scalars,
     sway_rate: Scalars,
 ) -> Scalars:
-    """Velocity y = s' + l theta' cos(theta) + l' sin(theta) [m/s], the paper's controlled variable."""
-    return cast(
-        "Scalars",
+    """The controlled variable y = s' + l theta' cos(theta) + l' sin(theta) [m/s], eq. (1)."""
+    return (
         trolley_velocity
-        + cable_length * sway_rate * np.cos(sway_angle)
-        + cable_rate * np.sin(sway_angle),
+        + cable_length * sway_rate * cosine(sway_angle)
+        + cable_rate * sine(sway_angle)
     )

@@ -19,15 +19,28 @@ import numpy as np
 
 
 class Arithmetic(NamedTuple):
-    """The three operations that differ between floats and arrays."""
+    """The operations that differ between floats and arrays."""
 
     minimum: Any
     maximum: Any
     sqrt: Any
+    copysign: Any
 
 
-FLOATS = Arithmetic(min, max, math.sqrt)
-ARRAYS = Arithmetic(np.minimum, np.maximum, np.sqrt)
+FLOATS = Arithmetic(min, max, math.sqrt, math.copysign)
+ARRAYS = Arithmetic(np.minimum, np.maximum, np.sqrt, np.copysign)
+
+
+class Stroke(NamedTuple):
+    """Where the limit switches let a drive go: `half` either side of `centre` [m]."""
+
+    centre: float
+    half: float
+
+    @classmethod
+    def between(cls, low: float, high: float) -> Stroke:
+        """Stroke from the lowest to the highest position [m]."""
+        return cls(0.5 * (low + high), 0.5 * (high - low))
 
 
 def stoppable_rate(
@@ -55,7 +68,7 @@ def next_rate(
     wanted: Any,
     *,
     position: Any,
-    limits: tuple[float, float],
+    stroke: Stroke,
     acceleration: float,
     period: float,
     arithmetic: Arithmetic = FLOATS,
@@ -66,7 +79,7 @@ def next_rate(
         rate: setpoint rate now [m/s].
         wanted: rate asked for one period from now [m/s].
         position: setpoint position now [m].
-        limits: lowest and highest position that the limit switches allow [m].
+        stroke: positions that the limit switches allow.
         acceleration: steepest ramp [m/s^2].
         period: control period [s].
         arithmetic: `FLOATS` or `ARRAYS`.
@@ -74,10 +87,10 @@ def next_rate(
     Returns:
         The rate [m/s]. The ramp outranks the switches: a drive cannot brake harder than it can.
     """
-    minimum, maximum, _ = arithmetic
-    low, high = limits
-    ceiling = stoppable_rate(rate, high - position, acceleration, period, arithmetic)
-    floor = -stoppable_rate(-rate, position - low, acceleration, period, arithmetic)
-    allowed = minimum(maximum(wanted, floor), ceiling)
+    minimum, maximum, _, copysign = arithmetic
+    direction = copysign(1.0, wanted)
+    gap = stroke.half - direction * (position - stroke.centre)
+    highest = stoppable_rate(direction * rate, gap, acceleration, period, arithmetic)
+    allowed = direction * minimum(abs(wanted), highest)
     step = acceleration * period
     return minimum(maximum(allowed, rate - step), rate + step)

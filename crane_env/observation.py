@@ -59,7 +59,7 @@ class Observation(NamedTuple):
         return cls._make(values)
 
 
-def observation_space(parameters: CraneParameters) -> Box:
+def observation_space(parameters: CraneParameters) -> Box[np.float64]:
     """Box of all observations that the crane can give, float64, shape (8,).
 
     The bounds are wide enough for a payload that swings over the girder or falls on a slack cable.

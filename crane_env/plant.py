@@ -27,7 +27,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from crane_env.motion import next_rate
+from crane_env.motion import Stroke, next_rate
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
 
@@ -86,9 +86,9 @@ class Plant:
             raise RuntimeError(f"crane.xml must declare its joints in the order {names}.")
         self._position, self._velocity, self._control = data.qpos, data.qvel, data.ctrl
         cable = model.actuator("cable").id
-        self._cable_gains = model.actuator_biasprm[cable]
-        self._travel_limit = parameters.trolley_position_limit
-        self._drum_limits = (
+        self._cable_gains = model.actuator_biasprm[cable, :3]
+        self._rail_stroke = Stroke(0.0, parameters.trolley_position_limit)
+        self._drum_stroke = Stroke.between(
             parameters.unstretched_length(parameters.cable_length_min),
             parameters.unstretched_length(parameters.cable_length_max),
         )
@@ -134,8 +134,9 @@ class Plant:
         """
         parameters = self.parameters
         length = parameters.cable_length_initial if cable_length is None else cable_length
+        rail = parameters.trolley_position_limit
         ranges = {
-            "trolley_position": (trolley_position, -self._travel_limit, self._travel_limit, "m"),
+            "trolley_position": (trolley_position, -rail, rail, "m"),
             "trolley_velocity": (
                 trolley_velocity,
                 -parameters.trolley_speed_max,
@@ -179,7 +180,7 @@ class Plant:
             setpoint_rate,
             min(max(wanted, -speed_max), speed_max),
             position=setpoint,
-            limits=(-self._travel_limit, self._travel_limit),
+            stroke=self._rail_stroke,
             acceleration=parameters.acceleration_max,
             period=period,
         )
@@ -190,7 +191,7 @@ class Plant:
             drum_rate,
             hoist_reference,
             position=drum,
-            limits=self._drum_limits,
+            stroke=self._drum_stroke,
             acceleration=self._hoist_acceleration,
             period=period,
         )
@@ -203,9 +204,12 @@ class Plant:
         return DriveReport(acceleration, limited)
 
     def _set_cable_gains(self, unstretched_length: float) -> None:
-        gains, parameters = self._cable_gains, self.parameters
-        gains[1] = -parameters.cable_stiffness / unstretched_length
-        gains[2] = -parameters.cable_damping / unstretched_length
+        parameters = self.parameters
+        self._cable_gains[:] = (
+            0.0,
+            -parameters.cable_stiffness / unstretched_length,
+            -parameters.cable_damping / unstretched_length,
+        )
 
     def state(self) -> CraneState:
         """Motion of trolley, cable and payload now."""
@@ -273,11 +277,11 @@ class Plant:
     @property
     def cable_tension(self) -> float:
         """Tension of the cable [N]; exactly 0 when slack."""
-        stretch = float(self._position[REACH] - self._position[DRUM])
-        stretch_rate = float(self._velocity[REACH] - self._velocity[DRUM])
-        return max(
-            0.0, -float(self._cable_gains[1]) * stretch - float(self._cable_gains[2]) * stretch_rate
-        )
+        _, _, _, reach, drum = self._position.tolist()
+        _, _, _, reach_rate, drum_rate = self._velocity.tolist()
+        _, stiffness, damping = self._cable_gains.tolist()
+        pull: float = stiffness * (drum - reach) + damping * (drum_rate - reach_rate)
+        return max(0.0, pull)
 
     @property
     def drive_force(self) -> float:

@@ -1,0 +1,43 @@
+# Two commands: `make evaluate` (the main job) and `make test`. Each sets up .venv by itself.
+
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin/python
+PIP := $(RUN) -m pip install --quiet --disable-pip-version-check
+
+.DEFAULT_GOAL := help
+.PHONY: help evaluate test check benchmark clean
+
+help:  ## Lists the commands.
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+evaluate: $(VENV)/run.stamp  ## Drives the ten manoeuvres of Table I; results in results/evaluate.
+	$(RUN) scripts/evaluate.py $(ARGS)
+
+test: $(VENV)/dev.stamp check  ## Runs the linters and all tests.
+	$(RUN) -m pytest $(ARGS)
+
+check: $(VENV)/dev.stamp  ## Runs the linters alone.
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m mypy
+
+benchmark: $(VENV)/run.stamp  ## Measures speed, as ratios taken in one run.
+	$(RUN) scripts/benchmark.py $(ARGS)
+
+clean:  ## Removes the virtual environment and caches, not the results.
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis build *.egg-info
+
+# A stamp appears only after its installation succeeded, so an interrupted one is repeated.
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "OILCrane needs Python 3.11 or newer; set PYTHON=/path/to/python3.11"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/python
+	$(PIP) --editable '.[mpc,results]'
+	@touch $@
+
+$(VENV)/dev.stamp: pyproject.toml | $(VENV)/bin/python
+	$(PIP) --editable '.[mpc,results,rl,dev]'
+	@touch $@ $(VENV)/run.stamp

@@ -1,0 +1,42 @@
+"""Operator-in-the-loop overhead crane: MuJoCo plant, random operators, Gymnasium environment.
+
+Importing this package registers `OILCrane-v0` with Gymnasium.
+"""
+
+from __future__ import annotations
+
+import gymnasium
+
+from crane_env.episode import Controller, Trajectory, run_episode
+from crane_env.metrics import Metrics
+from crane_env.observation import CraneState, Observation
+from crane_env.operator import ButtonEvent, Buttons, Operator
+from crane_env.operators import make_operator
+from crane_env.parameters import CraneParameters
+from crane_env.stage_cost import StageCost
+
+EPISODE_STEPS = 1250
+"""Control steps of one episode: 25 s at 20 ms; the last event of Table I is at 17.75 s."""
+
+gymnasium.register(
+    id="OILCrane-v0",
+    entry_point="crane_env.environment:OILCraneEnv",
+    max_episode_steps=EPISODE_STEPS,
+    # The checker repeats on every step what the tests prove once; it costs as much as the physics.
+    disable_env_checker=True,
+)
+
+__all__ = [
+    "ButtonEvent",
+    "Buttons",
+    "Controller",
+    "CraneParameters",
+    "CraneState",
+    "Metrics",
+    "Observation",
+    "Operator",
+    "StageCost",
+    "Trajectory",
+    "make_operator",
+    "run_episode",
+]
