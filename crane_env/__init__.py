@@ -7,13 +7,17 @@ from __future__ import annotations
 
 import gymnasium
 
+from crane_env.button_script import ButtonScript, read_script, write_script
 from crane_env.episode import Controller, Trajectory, run_episode
+from crane_env.manoeuvre import RandomManoeuvre
 from crane_env.metrics import Metrics
 from crane_env.observation import CraneState, Observation
 from crane_env.operator import ButtonEvent, Buttons, Operator
 from crane_env.operators import make_operator
 from crane_env.parameters import CraneParameters
+from crane_env.semi_markov import ButtonHabits, RandomButtons
 from crane_env.stage_cost import StageCost
+from crane_env.table1 import Table1Manoeuvre
 
 EPISODE_STEPS = 1250
 """Control steps of one episode: 25 s at 20 ms; the last event of Table I is at 17.75 s."""
@@ -28,6 +32,8 @@ gymnasium.register(
 
 __all__ = [
     "ButtonEvent",
+    "ButtonHabits",
+    "ButtonScript",
     "Buttons",
     "Controller",
     "CraneParameters",
@@ -35,8 +41,13 @@ __all__ = [
     "Metrics",
     "Observation",
     "Operator",
+    "RandomButtons",
+    "RandomManoeuvre",
     "StageCost",
+    "Table1Manoeuvre",
     "Trajectory",
     "make_operator",
+    "read_script",
     "run_episode",
+    "write_script",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 
 from crane_env.kinematics import payload_position, payload_velocity
 from crane_env.observation import CraneState, observation_space
-from crane_env.operator import ButtonEvent, Buttons, Operator, Program
-from crane_env.operators import make_operator
+from crane_env.operator import Buttons
+from crane_env.operators import OperatorSpec, make_operator
 from crane_env.parameters import CraneParameters
 from crane_env.plant import Plant
 from crane_env.stage_cost import StageCost
 
 if TYPE_CHECKING:
     from crane_env.rendering import CraneRenderer
-
-OperatorSpec = str | Mapping[str, Any] | Program | Operator | Sequence[ButtonEvent]
 
 RESET_STATE = ("cable_length", "sway_angle", "sway_rate", "trolley_position", "trolley_velocity")
 """Options of `reset` that place the crane; see `Plant.reset` for units and ranges."""

@@ -1,0 +1,1 @@
+"""Command-line stories: evaluate, benchmark and what follows."""

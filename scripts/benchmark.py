@@ -1,0 +1,211 @@
+"""Benchmark: speed of environment and controllers, as ratios taken in one run.
+
+Machines differ and are noisy, so absolute times say little. What is compared is run in turns,
+round after round, on the same states; a ratio is that of the medians over the rounds. `act` times
+are medians, 99th percentiles and maxima over states visited in closed loop on Table I.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import platform
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any
+
+import gymnasium
+import mujoco
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+import crane_env
+from baselines import make_controller
+from baselines.linear_mpc import LinearMpc
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Durations of one contestant [s].
+
+    Attributes:
+        name: what was timed.
+        median: per operation.
+        p99: 99th percentile.
+        maximum: longest.
+        ratio: median over the baseline's median.
+        allowed: bound on the ratio that the project promises, as text; empty if none.
+    """
+
+    name: str
+    median: float
+    p99: float
+    maximum: float
+    ratio: float
+    allowed: str = ""
+
+
+def in_turns(
+    contestants: dict[str, Callable[[int], object]], count: int, block: int = 50
+) -> dict[str, NDArray[np.float64]]:
+    """Times every contestant on the same questions, a block at a time in turns.
+
+    Blocks, not single calls: a contestant then finds the caches as its own calls left them.
+
+    Args:
+        contestants: name to what answers question k.
+        count: number of questions.
+        block: questions per turn.
+
+    Returns:
+        Durations [s], shape (count,) each.
+    """
+    durations = {name: np.empty(count) for name in contestants}
+    for contestant in contestants.values():
+        contestant(0)
+    for start in range(0, count, block):
+        for name, contestant in contestants.items():
+            for k in range(start, min(start + block, count)):
+                begin = perf_counter()
+                contestant(k)
+                durations[name][k] = perf_counter() - begin
+    return durations
+
+
+def timings(
+    durations: dict[str, NDArray[np.float64]], baseline: str, allowed: dict[str, str]
+) -> list[Timing]:
+    """Summarises durations, with ratios to the baseline's median."""
+    unit = float(np.median(durations[baseline]))
+    return [
+        Timing(
+            name=name,
+            median=float(np.median(seconds)),
+            p99=float(np.percentile(seconds, 99)),
+            maximum=float(seconds.max()),
+            ratio=float(np.median(seconds)) / unit,
+            allowed=allowed.get(name, ""),
+        )
+        for name, seconds in durations.items()
+    ]
+
+
+def benchmark_environment(rounds: int) -> list[Timing]:
+    """One `env.step` against the bare `mj_step` substeps of an equal crane."""
+    env = gymnasium.make("OILCrane-v0", operator="random", max_episode_steps=10**9)
+    env.reset(seed=0)
+    unwrapped = copy.deepcopy(env.unwrapped)
+    plant = copy.deepcopy(unwrapped.plant)  # type: ignore[attr-defined]
+    model, data, substeps = plant.model, plant.data, plant.parameters.substeps
+    action = np.array([0.001])
+    contestants: dict[str, Callable[[int], object]] = {
+        "mj_step": lambda _: mujoco.mj_step(model, data, nstep=substeps),
+        "env.step": lambda _: env.step(action),
+        "env.step, unwrapped": lambda _: unwrapped.step(action),
+    }
+    durations = in_turns(contestants, 100 * rounds)
+    return timings(durations, "mj_step", {"env.step": "<= 1.5", "env.step, unwrapped": "<= 1.5"})
+
+
+def closed_loop_states(count: int) -> NDArray[np.float64]:
+    """Observations visited by the adaptive MPC on Table I, spread evenly, shape (count, 8)."""
+    seen = []
+    for number in range(1, 11):
+        env = gymnasium.make("OILCrane-v0", operator=f"table1:{number}")
+        record = crane_env.run_episode(env, make_controller("adaptive"), seed=number)
+        columns = record.columns()
+        seen.append(np.stack([columns[name] for name in crane_env.Observation._fields], axis=1))
+    states = np.concatenate(seen)
+    return states[np.linspace(0, len(states) - 1, count).astype(int)]
+
+
+def benchmark_linear(rounds: int) -> list[Timing]:
+    """The adaptive MPC against its CVXPY statement and against a bare DAQP solve of its QP."""
+    states = closed_loop_states(20 * rounds)
+    adaptive = make_controller("adaptive")
+    statement = make_controller("adaptive-cvxpy")
+    linear = make_controller("linear")
+    assert isinstance(adaptive, LinearMpc)
+    program = adaptive._program
+    questions = []
+    for state in states:
+        observation = crane_env.Observation.of(state)
+        hessian, gradient = adaptive._model.cost(observation)
+        lower, upper = adaptive.limits.bounds(observation.trolley_velocity)
+        questions.append((np.ascontiguousarray(hessian), gradient.copy(), upper, lower))
+    import daqp
+
+    kinds = np.zeros(len(questions[0][2]), dtype=np.intc)
+
+    def bare(k: int) -> object:
+        hessian, gradient, upper, lower = questions[k]
+        return daqp.solve(hessian, gradient, program._matrix, upper, lower, kinds)
+
+    contestants: dict[str, Callable[[int], object]] = {
+        "adaptive": lambda k: adaptive.act(states[k]),
+        "linear": lambda k: linear.act(states[k]),
+        "bare DAQP": bare,
+        "adaptive-cvxpy": lambda k: statement.act(states[k]),
+    }
+    durations = in_turns(contestants, len(states))
+    return timings(durations, "adaptive", {"bare DAQP": ">= 1/6", "adaptive-cvxpy": ">= 30"})
+
+
+SECTIONS: dict[str, Callable[[int], list[Timing]]] = {
+    "environment": benchmark_environment,
+    "linear": benchmark_linear,
+}
+
+
+def show(title: str, rows: Sequence[Timing], console: Console) -> None:
+    """Prints one section as a table."""
+    table = Table(title=title, title_justify="left")
+    for heading in ("", "median [us]", "p99 [us]", "max [us]", "ratio", "promised"):
+        table.add_column(heading, justify="left" if not heading else "right")
+    for row in rows:
+        times = (f"{1e6 * t:.1f}" for t in (row.median, row.p99, row.maximum))
+        table.add_row(row.name, *times, f"{row.ratio:.3g}", row.allowed)
+    console.print(table)
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Measures the speed of environment and controllers, as ratios taken in one run."""
+
+    sections: Annotated[
+        tuple[str, ...], tyro.conf.arg(help=f"Which to run, of: {', '.join(SECTIONS)}.")
+    ] = field(default=tuple(SECTIONS))
+    rounds: Annotated[int, tyro.conf.arg(help="More rounds, steadier medians.")] = 20
+    output: Annotated[Path | None, tyro.conf.arg(help="Write the results to this JSON file.")] = (
+        None
+    )
+
+
+def main(arguments: Arguments) -> int:
+    """Runs the sections; returns the exit code."""
+    unknown = [name for name in arguments.sections if name not in SECTIONS]
+    if unknown or arguments.rounds < 1:
+        what = f"Unknown section {unknown[0]!r}" if unknown else "rounds must be at least 1"
+        print(f"{what}; valid sections: {', '.join(SECTIONS)}.", file=sys.stderr)
+        return 2
+    console = Console()
+    console.print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores")
+    results: dict[str, Any] = {}
+    for name in arguments.sections:
+        rows = SECTIONS[name](arguments.rounds)
+        show(name, rows, console)
+        results[name] = [asdict(row) for row in rows]
+    if arguments.output is not None:
+        arguments.output.write_text(json.dumps(results, indent=2), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(tyro.cli(Arguments, description=__doc__)))
