@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.mpc_settings import MpcSettings
+from baselines.trolley_limits import TrolleyLimits
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 
@@ -44,6 +45,7 @@ class SolverStatistics:
         failures: solves without a usable plan; the fallback acted instead.
         longest_failure_run: most failures in a row.
         braking_steps: failures that outlived the last plan, so that the crane was braked.
+        unconverged: plans that are the best found, not optimal: the iterations ran out.
     """
 
     solves: int = 0
@@ -51,6 +53,7 @@ class SolverStatistics:
     failures: int = 0
     longest_failure_run: int = 0
     braking_steps: int = 0
+    unconverged: int = 0
 
 
 @dataclass(frozen=True)
@@ -60,10 +63,12 @@ class Plan:
     Attributes:
         moves: trolley accelerations u_0 ... u_{N_c - 1} [m/s^2], shape (N_c,); None if it failed.
         iterations: solver iterations spent.
+        converged: False if the moves are the best found, but not optimal: the iterations ran out.
     """
 
     moves: NDArray[np.float64] | None
     iterations: int
+    converged: bool = True
 
 
 def finite_observation(array: NDArray[np.float64]) -> Observation:
@@ -74,9 +79,9 @@ def finite_observation(array: NDArray[np.float64]) -> Observation:
     """
     observation = Observation.of(array)
     if not all(map(math.isfinite, observation)):
-        bad = [name for name, x in zip(observation._fields, observation, strict=True)
-               if not math.isfinite(x)]
-        raise ValueError(f"The observation's {bad[0]} is not finite; act() needs real numbers.")
+        values = zip(observation._fields, observation, strict=True)
+        name, value = next((name, x) for name, x in values if not math.isfinite(x))
+        raise ValueError(f"The observation's {name} is {value}; act() needs finite numbers.")
     return observation
 
 
@@ -84,55 +89,64 @@ class PredictiveController(Controller):
     """Receding horizon: plan N_c moves, apply the first, plan again.
 
     A failed solve is data, not a crash: the previous plan, shifted by the steps since, acts in its
-    place; when that is used up the trolley is braked to rest within the acceleration limits. All
-    of it is counted in `statistics`.
+    place; when that is used up the trolley is braked to rest. All of it is counted in `statistics`.
+    Whatever the source of a move, it leaves within the limits of `TrolleyLimits.saturate`.
 
     Args:
         crane: nominal parameters; the true crane may differ.
         settings: the optimal control problem.
+
+    Attributes:
+        crane: the nominal parameters.
+        settings: the optimal control problem.
+        limits: acceleration and velocity limits of the moves.
     """
 
     def __init__(self, crane: CraneParameters, settings: MpcSettings) -> None:
         self.crane = crane
         self.settings = settings
-        self._acceleration_min, self._acceleration_max = settings.acceleration_range(crane)
+        self.limits = TrolleyLimits(crane, settings)
         self.reset()
 
     @final
     def reset(self) -> None:
         """Forgets the last plan and the statistics."""
-        self._moves: NDArray[np.float64] | None = None
-        self._moves_used = 0
+        self._schedule = np.zeros(2 * self.settings.control_horizon)
+        self._schedule_age = self.settings.control_horizon
         self._solves = 0
         self._iterations = 0
         self._failures = 0
         self._failure_run = 0
         self._longest_failure_run = 0
         self._braking_steps = 0
+        self._unconverged = 0
 
     @final
     def act(self, observation: NDArray[np.float64]) -> NDArray[np.float64]:
         """First move of a new plan; see `Controller.act`."""
         measured = finite_observation(observation)
-        plan = self._plan(measured, self._shifted_moves())
+        count, age = self.settings.control_horizon, self._schedule_age
+        plan = self._plan(measured, self._schedule[age : age + count])
         self._solves += 1
         self._iterations += plan.iterations
         if plan.moves is not None:
-            self._moves = plan.moves
-            self._moves_used = 0
+            self._schedule = np.empty(2 * count)
+            self._schedule[:count] = plan.moves
+            self._schedule[count:] = plan.moves[-1]
+            age = 0
             self._failure_run = 0
+            self._unconverged += not plan.converged
         else:
             self._failures += 1
             self._failure_run += 1
             self._longest_failure_run = max(self._longest_failure_run, self._failure_run)
-        if self._moves is not None and self._moves_used < len(self._moves):
-            acceleration = float(self._moves[self._moves_used])
-            self._moves_used += 1
+        if age < count:
+            acceleration = float(self._schedule[age])
+            self._schedule_age = age + 1
         else:
-            self._braking_steps += 1
             acceleration = -measured.trolley_velocity / self.crane.control_period
-        low, high = self._acceleration_min, self._acceleration_max
-        return np.array([min(max(acceleration, low), high)])
+            self._braking_steps += 1
+        return np.array([self.limits.saturate(acceleration, measured.trolley_velocity)])
 
     @property
     @final
@@ -144,6 +158,7 @@ class PredictiveController(Controller):
             failures=self._failures,
             longest_failure_run=self._longest_failure_run,
             braking_steps=self._braking_steps,
+            unconverged=self._unconverged,
         )
 
     @abstractmethod
@@ -155,13 +170,3 @@ class PredictiveController(Controller):
             shifted_moves: the last plan shifted to now, its last move repeated, shape (N_c,)
                 [m/s^2]; zeros after a reset.
         """
-
-    def _shifted_moves(self) -> NDArray[np.float64]:
-        count = self.settings.control_horizon
-        if self._moves is None:
-            return np.zeros(count)
-        first = min(self._moves_used, count - 1)
-        shifted = np.empty(count)
-        shifted[: count - first] = self._moves[first:]
-        shifted[count - first :] = self._moves[-1]
-        return shifted

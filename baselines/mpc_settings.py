@@ -49,23 +49,17 @@ class MpcSettings:
                 f"control_horizon ({self.control_horizon}) must not exceed "
                 f"prediction_horizon ({self.prediction_horizon})."
             )
-        if not isinstance(self.cost, StageCost):
-            object.__setattr__(self, "cost", StageCost.of(self.cost))
+        object.__setattr__(self, "cost", StageCost.of(self.cost))
         if self.tail not in get_args(Tail):
             raise ValueError(f"Unknown tail {self.tail!r}; valid: {', '.join(get_args(Tail))}.")
         length = self.model_cable_length
-        if not isinstance(length, (int, float)) or not math.isfinite(length) or length <= 0.0:
+        is_number = isinstance(length, (int, float)) and not isinstance(length, bool)
+        if not is_number or not math.isfinite(length) or length <= 0.0:
             raise ValueError(f"model_cable_length must be a positive length, not {length!r}.")
         for name in ("acceleration_limits", "velocity_limits"):
             limits = getattr(self, name)
-            if limits is None:
-                continue
-            low, high = (float(limit) for limit in limits)
-            if not low < high or not low <= 0.0 <= high:
-                raise ValueError(
-                    f"{name} must be a low and a higher limit that allow rest (0), not {limits!r}."
-                )
-            object.__setattr__(self, name, (low, high))
+            if limits is not None:
+                object.__setattr__(self, name, _checked_limits(name, limits))
 
     @classmethod
     def of(cls, value: MpcSettings | Mapping[str, Any] | None) -> MpcSettings:
@@ -95,3 +89,15 @@ class MpcSettings:
     def velocity_range(self, crane: CraneParameters) -> tuple[float, float]:
         """Lowest and highest trolley velocity on this crane [m/s]."""
         return self.velocity_limits or (-crane.trolley_speed_max, crane.trolley_speed_max)
+
+
+def _checked_limits(name: str, limits: Any) -> tuple[float, float]:
+    try:
+        low, high = (float(limit) for limit in limits)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a pair of numbers, not {limits!r}.") from None
+    if not low < high or not low <= 0.0 <= high or math.isinf(high - low):
+        raise ValueError(
+            f"{name} must be a low and a higher finite limit that allow rest (0), not {limits!r}."
+        )
+    return low, high

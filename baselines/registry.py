@@ -14,6 +14,13 @@ CONTROLLERS: dict[str, str] = {
     "manual": "baselines.manual:manual",
     "linear": "baselines.linear_mpc:linear",
     "adaptive": "baselines.linear_mpc:adaptive",
+    "nmpc-a": "baselines.nmpc:nmpc_a",
+    "nmpc-b": "baselines.nmpc:nmpc_b",
+    "nmpc-a-rti": "baselines.nmpc:nmpc_a_rti",
+    "nmpc-b-rti": "baselines.nmpc:nmpc_b_rti",
+    "nmpc-a-ipopt": "baselines.nmpc_ipopt:nmpc_a_ipopt",
+    "nmpc-b-ipopt": "baselines.nmpc_ipopt:nmpc_b_ipopt",
+    "linear-cvxpy": "baselines.equation6:linear_cvxpy",
     "adaptive-cvxpy": "baselines.equation6:adaptive_cvxpy",
 }
 """Name of each controller and where its factory (crane, settings) -> Controller is."""
@@ -28,7 +35,7 @@ def make_controller(
     """Builds a controller from nominal parameters.
 
     Args:
-        name: one of `CONTROLLERS`.
+        name: one of `CONTROLLERS`, or a factory of your own as "package.module:factory".
         parameters: the crane that the controller believes in; None: the paper's.
         settings: the optimal control problem; None: the paper's. Ignored by controllers that
             solve none.
@@ -37,9 +44,17 @@ def make_controller(
         ValueError: an unknown name (the message lists the valid ones), or values out of range.
         ImportError: a package is missing; the message names the extra that brings it.
     """
-    if name not in CONTROLLERS:
-        raise ValueError(f"Unknown controller {name!r}; valid: {', '.join(CONTROLLERS)}.")
-    module, factory = CONTROLLERS[name].split(":")
-    build = getattr(importlib.import_module(module), factory)
+    module, colon, factory = CONTROLLERS.get(name, name).partition(":")
+    if not colon:
+        raise ValueError(
+            f"Unknown controller {name!r}; valid: {', '.join(CONTROLLERS)}, or a factory of your "
+            "own as package.module:factory."
+        )
+    try:
+        build = getattr(importlib.import_module(module), factory, None)
+    except ModuleNotFoundError as error:
+        raise ImportError(f"The controller {name!r} cannot be imported: {error}.") from error
+    if not callable(build):
+        raise ValueError(f"The module {module!r} has no controller factory {factory!r}.")
     controller: Controller = build(CraneParameters.of(parameters), MpcSettings.of(settings))
     return controller
