@@ -141,7 +141,7 @@ class NonlinearPrediction:
             casadi.SX.sym(name, horizon.periods + 1) for name in ("durations", "rates", "passed")
         )
         self.parameters = casadi.vertcat(start, durations, rates, passed)
-        with _numpy_on_symbols(casadi):
+        with numpy_on_symbols(casadi):
             tracking, sway = self._predict(casadi.vertsplit(start), durations, rates, passed)
         self.residuals = casadi.vertcat(*tracking, *sway, horizon.move_gain * self.moves)
 
@@ -206,7 +206,7 @@ def _at_period_ends(values: list[Any], passed: Any) -> list[Any]:
 
 
 @contextlib.contextmanager
-def _numpy_on_symbols(casadi: Any) -> Iterator[None]:
+def numpy_on_symbols(casadi: Any) -> Iterator[None]:
     """Lets numpy's functions build CasADi expressions, without the warning of its older mode."""
     options = casadi.GlobalOptions
     mode = options.getNumpyMode()

@@ -20,6 +20,7 @@ CONTROLLERS: dict[str, str] = {
     "nmpc-b-rti": "baselines.nmpc:nmpc_b_rti",
     "nmpc-a-ipopt": "baselines.nmpc_ipopt:nmpc_a_ipopt",
     "nmpc-b-ipopt": "baselines.nmpc_ipopt:nmpc_b_ipopt",
+    "nmpc-a-do-mpc": "baselines.nmpc_do_mpc:nmpc_a_do_mpc",
     "linear-cvxpy": "baselines.equation6:linear_cvxpy",
     "adaptive-cvxpy": "baselines.equation6:adaptive_cvxpy",
 }
