@@ -6,7 +6,6 @@ import dataclasses
 import json
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol
 
@@ -14,6 +13,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from crane_env.atomic_file import atomic_file
 from crane_env.extras import require
 from crane_env.metrics import Metrics, measure
 from crane_env.observation import Observation
@@ -117,13 +117,8 @@ class Trajectory:
             "solver_failures": str(self.solver_failures),
         }
         table = pyarrow.table(self.columns()).replace_schema_metadata(metadata)
-        target = Path(path)
-        partial = target.with_name(f".{target.name}.{os.getpid()}.partial")
-        try:
+        with atomic_file(path) as partial:
             parquet.write_table(table, partial)
-            partial.replace(target)
-        finally:
-            partial.unlink(missing_ok=True)
 
     @classmethod
     def from_parquet(cls, path: str | os.PathLike[str]) -> Trajectory:
