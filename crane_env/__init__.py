@@ -25,6 +25,7 @@ EPISODE_STEPS = 1250
 gymnasium.register(
     id="OILCrane-v0",
     entry_point="crane_env.environment:OILCraneEnv",
+    vector_entry_point="crane_env.vector_environment:OILCraneVectorEnv",
     max_episode_steps=EPISODE_STEPS,
     # The checker repeats on every step what the tests prove once; it costs as much as the physics.
     disable_env_checker=True,

@@ -25,20 +25,23 @@ class Arithmetic(NamedTuple):
     maximum: Any
     sqrt: Any
     copysign: Any
+    where: Any
 
 
-FLOATS = Arithmetic(min, max, math.sqrt, math.copysign)
-ARRAYS = Arithmetic(np.minimum, np.maximum, np.sqrt, np.copysign)
+FLOATS = Arithmetic(
+    min, max, math.sqrt, math.copysign, lambda condition, yes, no: yes if condition else no
+)
+ARRAYS = Arithmetic(np.minimum, np.maximum, np.sqrt, np.copysign, np.where)
 
 
 class Stroke(NamedTuple):
     """Where the limit switches let a drive go: `half` either side of `centre` [m]."""
 
-    centre: float
-    half: float
+    centre: Any
+    half: Any
 
     @classmethod
-    def between(cls, low: float, high: float) -> Stroke:
+    def between(cls, low: Any, high: Any) -> Stroke:
         """Stroke from the lowest to the highest position [m]."""
         return cls(0.5 * (low + high), 0.5 * (high - low))
 
@@ -87,7 +90,7 @@ def next_rate(
     Returns:
         The rate [m/s]. The ramp outranks the switches: a drive cannot brake harder than it can.
     """
-    minimum, maximum, _, copysign = arithmetic
+    minimum, maximum, _, copysign, _ = arithmetic
     direction = copysign(1.0, wanted)
     gap = stroke.half - direction * (position - stroke.centre)
     highest = stoppable_rate(direction * rate, gap, acceleration, period, arithmetic)

@@ -8,6 +8,7 @@ step at or after t.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple, Protocol
 
@@ -105,6 +106,11 @@ class ScheduledOperator:
         self._events = self.program.events(rng, start, parameters)
         self._next = next(self._events, None)
         self._pressed = RELEASED
+
+    @property
+    def due(self) -> float:
+        """Time of the next event [s]; `press` changes nothing before. Infinite after the last."""
+        return math.inf if self._next is None else self._next.time
 
     def press(self, time: float, state: CraneState) -> Buttons:
         """Buttons at `time` [s]; see `Operator.press`."""

@@ -21,27 +21,23 @@ from __future__ import annotations
 
 import math
 from importlib import resources
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from crane_env.motion import Stroke, next_rate
+from crane_env.drives import DriveReport, Drives
+from crane_env.motion import Stroke
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
 
 
-class DriveReport(NamedTuple):
-    """What the drives did with a command.
+class Coordinates(NamedTuple):
+    """Joint positions and velocities, in the order of `SETPOINT` to `DRUM`; SI units."""
 
-    Attributes:
-        acceleration: mean acceleration of the trolley's setpoint over the period [m/s^2].
-        limited: whether the speed limit or a limit switch overruled the commanded acceleration.
-    """
-
-    acceleration: float
-    limited: bool
+    position: tuple[float, float, float, float, float]
+    velocity: tuple[float, float, float, float, float]
 
 
 def build_model(parameters: CraneParameters) -> mujoco.MjModel:
@@ -56,11 +52,82 @@ def build_model(parameters: CraneParameters) -> mujoco.MjModel:
     model.tendon_damping[rail] = parameters.trolley_friction
     model.tendon_range[rail] = (-parameters.rail_half_length, parameters.rail_half_length)
     model.joint("sway").damping[0] = parameters.sway_friction
-    velocity_loop = parameters.trolley_mass * parameters.drive_bandwidth
+    position_loop, velocity_loop = drive_loops(parameters)
+    model.joint("drive_error").stiffness[0] = position_loop
     model.joint("drive_error").damping[0] = velocity_loop
-    model.joint("drive_error").stiffness[0] = velocity_loop * parameters.drive_bandwidth / 4.0
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
+
+
+def drive_loops(parameters: CraneParameters) -> tuple[float, float]:
+    """Gains of the trolley drive's position loop [N/m] and velocity loop [N s/m]."""
+    velocity_loop = parameters.trolley_mass * parameters.drive_bandwidth
+    return velocity_loop * parameters.drive_bandwidth / 4.0, velocity_loop
+
+
+def cable_gains(stiffness: Any, damping: Any, unstretched_length: Any) -> tuple[Any, Any, Any]:
+    """Bias of the actuator "cable": 0, -K_l / l_0 and -C_l / l_0; of floats or arrays."""
+    return 0.0, -stiffness / unstretched_length, -damping / unstretched_length
+
+
+def cable_pull(
+    stiffness: Any, damping: Any, reach: Any, reach_rate: Any, drum: Any, drum_rate: Any
+) -> Any:
+    """Tension of the cable [N] before it is cut off at 0, from `cable_gains`; floats or arrays."""
+    return stiffness * (drum - reach) + damping * (drum_rate - reach_rate)
+
+
+def drum_stroke(parameters: CraneParameters) -> Stroke:
+    """Unstretched lengths [m] that the hoist's limit switches allow."""
+    return Stroke.between(
+        parameters.unstretched_length(parameters.cable_length_min),
+        parameters.unstretched_length(parameters.cable_length_max),
+    )
+
+
+def place(
+    parameters: CraneParameters,
+    *,
+    trolley_position: float = 0.0,
+    trolley_velocity: float = 0.0,
+    cable_length: float | None = None,
+    sway_angle: float = 0.0,
+    sway_rate: float = 0.0,
+) -> Coordinates:
+    """Places a crane with the hoist at rest and the cable in balance.
+
+    Args:
+        parameters: the crane.
+        trolley_position: within the limit switches [m].
+        trolley_velocity: within the speed limit [m/s].
+        cable_length: sheave to payload, within the hoist limits [m]; None: the initial length.
+        sway_angle: less than a right angle either way [rad].
+        sway_rate: [rad/s].
+
+    Raises:
+        ValueError: a value outside its range.
+    """
+    length = parameters.cable_length_initial if cable_length is None else cable_length
+    rail = parameters.trolley_position_limit
+    speed_max = parameters.trolley_speed_max
+    ranges = {
+        "trolley_position": (trolley_position, -rail, rail, "m"),
+        "trolley_velocity": (trolley_velocity, -speed_max, speed_max, "m/s"),
+        "cable_length": (length, parameters.cable_length_min, parameters.cable_length_max, "m"),
+        "sway_angle": (sway_angle, -0.5 * math.pi, 0.5 * math.pi, "rad"),
+        "sway_rate": (sway_rate, -MAX_INITIAL_SWAY_RATE, MAX_INITIAL_SWAY_RATE, "rad/s"),
+    }
+    for name, (value, low, high, unit) in ranges.items():
+        if not low <= value <= high:
+            raise ValueError(f"{name} must be from {low:.6g} to {high:.6g} {unit}, not {value!r}.")
+    tension = parameters.payload_mass * (
+        parameters.gravity * math.cos(sway_angle) + length * sway_rate**2
+    )
+    drum = length / (1.0 + tension / parameters.cable_stiffness)
+    return Coordinates(
+        (trolley_position, 0.0, sway_angle, length, drum),
+        (trolley_velocity, 0.0, sway_rate, 0.0, 0.0),
+    )
 
 
 class Plant:
@@ -87,15 +154,8 @@ class Plant:
         self._position, self._velocity, self._control = data.qpos, data.qvel, data.ctrl
         cable = model.actuator("cable").id
         self._cable_gains = model.actuator_biasprm[cable, :3]
-        self._rail_stroke = Stroke(0.0, parameters.trolley_position_limit)
-        self._drum_stroke = Stroke.between(
-            parameters.unstretched_length(parameters.cable_length_min),
-            parameters.unstretched_length(parameters.cable_length_max),
-        )
-        # A true step of the hoist reverses within one period at most.
-        self._hoist_acceleration = min(
-            parameters.hoist_acceleration, 2.0 * parameters.hoist_speed / parameters.control_period
-        )
+        self._drives = Drives(parameters, drum_stroke(parameters))
+        self._substeps = parameters.substeps
 
     def __getstate__(self) -> dict[str, object]:
         """Parameters and full integration state: a copy continues bit for bit."""
@@ -120,46 +180,23 @@ class Plant:
         sway_angle: float = 0.0,
         sway_rate: float = 0.0,
     ) -> None:
-        """Places the crane with the hoist at rest and the cable in balance.
-
-        Args:
-            trolley_position: within the limit switches [m].
-            trolley_velocity: within the speed limit [m/s].
-            cable_length: sheave to payload, within the hoist limits [m]; None: the initial length.
-            sway_angle: less than a right angle either way [rad].
-            sway_rate: [rad/s].
+        """Places the crane as `place` does; refused, it stays where it is.
 
         Raises:
             ValueError: a value outside its range.
         """
-        parameters = self.parameters
-        length = parameters.cable_length_initial if cable_length is None else cable_length
-        rail = parameters.trolley_position_limit
-        ranges = {
-            "trolley_position": (trolley_position, -rail, rail, "m"),
-            "trolley_velocity": (
-                trolley_velocity,
-                -parameters.trolley_speed_max,
-                parameters.trolley_speed_max,
-                "m/s",
-            ),
-            "cable_length": (length, parameters.cable_length_min, parameters.cable_length_max, "m"),
-            "sway_angle": (sway_angle, -0.5 * math.pi, 0.5 * math.pi, "rad"),
-            "sway_rate": (sway_rate, -MAX_INITIAL_SWAY_RATE, MAX_INITIAL_SWAY_RATE, "rad/s"),
-        }
-        for name, (value, low, high, unit) in ranges.items():
-            if not low <= value <= high:
-                raise ValueError(
-                    f"{name} must be from {low:.6g} to {high:.6g} {unit}, not {value!r}."
-                )
-        mujoco.mj_resetData(self.model, self.data)
-        tension = parameters.payload_mass * (
-            parameters.gravity * math.cos(sway_angle) + length * sway_rate**2
+        position, velocity = place(
+            self.parameters,
+            trolley_position=trolley_position,
+            trolley_velocity=trolley_velocity,
+            cable_length=cable_length,
+            sway_angle=sway_angle,
+            sway_rate=sway_rate,
         )
-        drum = length / (1.0 + tension / parameters.cable_stiffness)
-        self._position[:] = (trolley_position, 0.0, sway_angle, length, drum)
-        self._velocity[:] = (trolley_velocity, 0.0, sway_rate, 0.0, 0.0)
-        self._set_cable_gains(drum)
+        mujoco.mj_resetData(self.model, self.data)
+        self._position[:] = position
+        self._velocity[:] = velocity
+        self._set_cable_gains(position[DRUM])
         mujoco.mj_forward(self.model, self.data)
 
     def step(self, acceleration: float, hoist_reference: float) -> DriveReport:
@@ -169,46 +206,21 @@ class Plant:
             acceleration: what the trolley drive is asked for, within its limit [m/s^2].
             hoist_reference: cable rate that the hoist ramps to, > 0 lengthens [m/s].
         """
-        parameters = self.parameters
-        period = parameters.control_period
         setpoint, _, _, _, drum = self._position.tolist()
         setpoint_rate, _, _, _, drum_rate = self._velocity.tolist()
-
-        speed_max = parameters.trolley_speed_max
-        wanted = setpoint_rate + acceleration * period
-        rate = next_rate(
-            setpoint_rate,
-            min(max(wanted, -speed_max), speed_max),
-            position=setpoint,
-            stroke=self._rail_stroke,
-            acceleration=parameters.acceleration_max,
-            period=period,
-        )
-        limited = abs(rate - wanted) > RATE_ROUNDING
-        if limited:
-            acceleration = (rate - setpoint_rate) / period
-        hoist_rate = next_rate(
-            drum_rate,
-            hoist_reference,
-            position=drum,
-            stroke=self._drum_stroke,
-            acceleration=self._hoist_acceleration,
-            period=period,
-        )
-        if parameters.hoist_ramp_time == 0.0:
-            self._velocity[DRUM] = drum_rate = hoist_rate
-        self._control[0] = acceleration
-        self._control[1] = (hoist_rate - drum_rate) / period
-        self._set_cable_gains(drum + 0.25 * period * (drum_rate + hoist_rate))
-        mujoco.mj_step(self.model, self.data, nstep=parameters.substeps)
-        return DriveReport(acceleration, limited)
+        travel = self._drives.travel(setpoint, setpoint_rate, acceleration)
+        hoist = self._drives.hoist(drum, drum_rate, hoist_reference)
+        self._velocity[DRUM] = hoist.rate
+        self._control[0] = travel.acceleration
+        self._control[1] = hoist.acceleration
+        self._set_cable_gains(hoist.middle)
+        mujoco.mj_step(self.model, self.data, nstep=self._substeps)
+        return travel
 
     def _set_cable_gains(self, unstretched_length: float) -> None:
         parameters = self.parameters
-        self._cable_gains[:] = (
-            0.0,
-            -parameters.cable_stiffness / unstretched_length,
-            -parameters.cable_damping / unstretched_length,
+        self._cable_gains[:] = cable_gains(
+            parameters.cable_stiffness, parameters.cable_damping, unstretched_length
         )
 
     def state(self) -> CraneState:
@@ -280,7 +292,7 @@ class Plant:
         _, _, _, reach, drum = self._position.tolist()
         _, _, _, reach_rate, drum_rate = self._velocity.tolist()
         _, stiffness, damping = self._cable_gains.tolist()
-        pull: float = stiffness * (drum - reach) + damping * (drum_rate - reach_rate)
+        pull: float = cable_pull(stiffness, damping, reach, reach_rate, drum, drum_rate)
         return max(0.0, pull)
 
     @property
@@ -300,9 +312,6 @@ class Plant:
 
 
 SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
-
-RATE_ROUNDING = 1e-12
-"""Differences of rates below this are rounding, not a limit [m/s]."""
 
 MAX_INITIAL_SWAY_RATE = 2.0
 """Fastest sway that a reset may ask for [rad/s]."""
