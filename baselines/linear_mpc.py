@@ -155,6 +155,12 @@ def move_cost(settings: MpcSettings) -> NDArray[np.float64]:
     return weight * np.eye(settings.control_horizon)
 
 
+def adaptive_cost(crane: CraneParameters, settings: MpcSettings) -> AdaptiveCost:
+    """Cost at the measured cable length."""
+    prediction = PendulumPrediction(crane.gravity, crane.control_period, settings)
+    return AdaptiveCost(prediction, move_cost(settings), crane.cable_length_min)
+
+
 def linear(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:
     """MPC of ref. [18]: model (3) at `settings.model_cable_length`."""
     prediction = PendulumPrediction(crane.gravity, crane.control_period, settings)
@@ -164,9 +170,7 @@ def linear(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:
 
 def adaptive(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:
     """MPC under Assumption A: model (3) at the measured cable length."""
-    prediction = PendulumPrediction(crane.gravity, crane.control_period, settings)
-    model = AdaptiveCost(prediction, move_cost(settings), crane.cable_length_min)
-    return LinearMpc(crane, settings, model)
+    return LinearMpc(crane, settings, adaptive_cost(crane, settings))
 
 
 ACCELERATION_WEIGHT_MIN = 1e-6

@@ -10,22 +10,15 @@ and the sensitivities S of (theta, theta') to the moves follow S_{j+1} = A_j S_j
 unit vector of the move that acts. Each residual's row of the Jacobian is then
 
     dy/du = dv/du + (r cos(theta) - l theta' sin(theta)) S_theta + l cos(theta) S_theta'
-
-The first call of a process compiles for seconds or loads what an earlier process compiled.
 """
 
 from __future__ import annotations
 
-import functools
-import hashlib
-import inspect
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines import cable_prediction, crane_model, nonlinear_prediction
 from baselines.cable_prediction import cable_intervals, hoist_stop_time
 from baselines.crane_model import (
     ARC_GAINS,
@@ -36,11 +29,10 @@ from baselines.crane_model import (
     tangential_acceleration,
     tangential_gradient,
 )
+from baselines.machine_code import machine_code
 from baselines.nonlinear_prediction import Horizon, Start
-from crane_env.extras import require
 
 _Array = NDArray[np.float64]
-_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def residuals_and_jacobian(moves: _Array, horizon: Horizon, start: Start) -> tuple[_Array, _Array]:
@@ -166,44 +158,17 @@ def _step(
         rate[i] = (rate[i] - cable_rate * angle[i]) * per_length
 
 
-@functools.cache
 def compiled_residuals_and_jacobian() -> Callable[..., tuple[_Array, _Array]]:
-    """`residuals_and_jacobian` as machine code, for arguments (moves, *horizon, *start).
+    """`residuals_and_jacobian` as `machine_code`, for arguments (moves, *horizon, *start).
 
     Raises:
         ImportError: numba is not installed; the message names the extra.
     """
-    register = require("numba.extending", extra="mpc").register_jitable(error_model="numpy")
-    for function in (
+    return machine_code(
+        residuals_and_jacobian,
         tangential_acceleration,
         tangential_gradient,
         hoist_stop_time,
         cable_intervals,
         _step,
-        residuals_and_jacobian,
-    ):
-        register(function)
-    # numba looks for changes only in the file of the function that it compiles and in the values
-    # that this one encloses: without the digest it would load machine code of an older model.
-    modules = (cable_prediction, crane_model, nonlinear_prediction)
-    digest = hashlib.sha256("".join(map(inspect.getsource, modules)).encode()).digest()
-    split = len(Horizon._fields)
-
-    # Numbers, because numba unpacks them faster than named tuples.
-    def evaluate(moves: _Array, *numbers: Any) -> tuple[_Array, _Array]:
-        _ = digest
-        return residuals_and_jacobian(moves, Horizon(*numbers[:split]), Start(*numbers[split:]))
-
-    return compiled(evaluate)
-
-
-def compiled(function: _Function) -> _Function:
-    """Compiles a function on its first call and keeps the machine code for later processes.
-
-    Where no folder can be written, each process compiles for itself.
-    """
-    jit = require("numba", extra="mpc").njit
-    try:
-        return cast("_Function", jit(cache=True, error_model="numpy")(function))
-    except RuntimeError:  # "cannot cache function: no locator available"
-        return cast("_Function", jit(error_model="numpy")(function))
+    )

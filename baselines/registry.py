@@ -21,6 +21,9 @@ CONTROLLERS: dict[str, str] = {
     "nmpc-a-ipopt": "baselines.nmpc_ipopt:nmpc_a_ipopt",
     "nmpc-b-ipopt": "baselines.nmpc_ipopt:nmpc_b_ipopt",
     "nmpc-a-do-mpc": "baselines.nmpc_do_mpc:nmpc_a_do_mpc",
+    "ltv": "baselines.ltv:ltv",
+    "tabulated": "baselines.tabulated:tabulated",
+    "tabulated-ltv": "baselines.tabulated:tabulated_ltv",
     "linear-cvxpy": "baselines.equation6:linear_cvxpy",
     "adaptive-cvxpy": "baselines.equation6:adaptive_cvxpy",
 }
