@@ -16,7 +16,7 @@ from crane_env.observation import CraneState, observation_space
 from crane_env.operator import Buttons
 from crane_env.operators import OperatorSpec, make_operator
 from crane_env.parameters import CraneParameters
-from crane_env.plant import Plant
+from crane_env.plant import Plant, SimulationDivergedError
 from crane_env.stage_cost import StageCost
 
 if TYPE_CHECKING:
@@ -92,7 +92,9 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
 
     ## Episode end
 
-    Never terminates; truncated after 1250 steps (25 s) when made by `gymnasium.make`.
+    Never terminates; truncated after 1250 steps (25 s) when made by `gymnasium.make`. Should the
+    simulation ever diverge, the crane stays where it was, the episode is truncated and `info` has
+    `simulation_failed`.
 
     Args:
         operator: who presses the buttons: "random", "manoeuvre", "table1:3", "script:FILE", a
@@ -193,10 +195,15 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         limit = self.parameters.acceleration_max
         command = min(max(asked, -limit), limit)
         reference = self._travel_reference
-        drive = self.plant.step(command, self._hoist_reference)
+        diverged = False
+        try:
+            drive = self.plant.step(command, self._hoist_reference)
+        except SimulationDivergedError as error:
+            drive, diverged = error.drive, True
         self._step_index += 1
         state = self.plant.state()
-        self._read_buttons(state)
+        if not diverged:
+            self._read_buttons(state)
         info = self._info(state)
         tracking, sway, effort = self.cost.terms(
             info["payload_velocity"],
@@ -213,10 +220,12 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         info["reward_tracking"] = tracking
         info["reward_sway"] = sway
         info["reward_acceleration"] = effort
+        if diverged:
+            info["simulation_failed"] = True
         if self.render_mode == "human":
             self.render()
         reward = tracking + sway + effort
-        return self._observation(state), reward, False, False, info
+        return self._observation(state), reward, False, diverged, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draws the crane, the pendant, and reference and payload velocity.

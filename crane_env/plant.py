@@ -101,7 +101,7 @@ def place(
         trolley_position: within the limit switches [m].
         trolley_velocity: within the speed limit [m/s].
         cable_length: sheave to payload, within the hoist limits [m]; None: the initial length.
-        sway_angle: less than a right angle either way [rad].
+        sway_angle: clear of the girder [rad].
         sway_rate: [rad/s].
 
     Raises:
@@ -114,7 +114,7 @@ def place(
         "trolley_position": (trolley_position, -rail, rail, "m"),
         "trolley_velocity": (trolley_velocity, -speed_max, speed_max, "m/s"),
         "cable_length": (length, parameters.cable_length_min, parameters.cable_length_max, "m"),
-        "sway_angle": (sway_angle, -0.5 * math.pi, 0.5 * math.pi, "rad"),
+        "sway_angle": (sway_angle, -MAX_INITIAL_SWAY, MAX_INITIAL_SWAY, "rad"),
         "sway_rate": (sway_rate, -MAX_INITIAL_SWAY_RATE, MAX_INITIAL_SWAY_RATE, "rad/s"),
     }
     for name, (value, low, high, unit) in ranges.items():
@@ -128,6 +128,18 @@ def place(
         (trolley_position, 0.0, sway_angle, length, drum),
         (trolley_velocity, 0.0, sway_rate, 0.0, 0.0),
     )
+
+
+class SimulationDivergedError(RuntimeError):
+    """The simulation of a control period diverged; the crane stays where it was before.
+
+    Attributes:
+        drive: what the trolley drive was asked for in that period.
+    """
+
+    def __init__(self, drive: DriveReport) -> None:
+        super().__init__("The simulation diverged; the crane stays where it was.")
+        self.drive = drive
 
 
 class Plant:
@@ -205,16 +217,27 @@ class Plant:
         Args:
             acceleration: what the trolley drive is asked for, within its limit [m/s^2].
             hoist_reference: cable rate that the hoist ramps to, > 0 lengthens [m/s].
+
+        Raises:
+            SimulationDivergedError: the equations of motion have no usable solution; the crane
+                stays where it was.
         """
-        setpoint, _, _, _, drum = self._position.tolist()
-        setpoint_rate, _, _, _, drum_rate = self._velocity.tolist()
+        position, velocity = self._position.tolist(), self._velocity.tolist()
+        setpoint, _, _, _, drum = position
+        setpoint_rate, _, _, _, drum_rate = velocity
+        data, begin = self.data, self.data.time
         travel = self._drives.travel(setpoint, setpoint_rate, acceleration)
         hoist = self._drives.hoist(drum, drum_rate, hoist_reference)
         self._velocity[DRUM] = hoist.rate
         self._control[0] = travel.acceleration
         self._control[1] = hoist.acceleration
         self._set_cable_gains(hoist.middle)
-        mujoco.mj_step(self.model, self.data, nstep=self._substeps)
+        mujoco.mj_step(self.model, data, nstep=self._substeps)
+        if data.time <= begin:
+            # MuJoCo has counted a diverged state and gone on from the model's origin at time 0.
+            self._position[:], self._velocity[:], data.time = position, velocity, begin
+            mujoco.mj_forward(self.model, data)
+            raise SimulationDivergedError(travel)
         return travel
 
     def _set_cable_gains(self, unstretched_length: float) -> None:
@@ -312,6 +335,9 @@ class Plant:
 
 
 SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
+
+MAX_INITIAL_SWAY = math.radians(80.0)
+"""Widest sway that a reset may ask for [rad]; at 85 degrees the payload meets the girder."""
 
 MAX_INITIAL_SWAY_RATE = 2.0
 """Fastest sway that a reset may ask for [rad/s]."""

@@ -345,6 +345,17 @@ def test_wrong_arguments_are_refused_with_a_sentence(
         make(**arguments)
 
 
+def test_a_diverged_simulation_truncates_the_episode_and_says_so() -> None:
+    env = make()
+    env.reset(seed=0)
+    env.step(np.array([1.0]))
+    env.unwrapped.plant.data.qvel[2] = 1e30
+    observation, _, terminated, truncated, info = env.step(np.array([1.0]))
+    assert (terminated, truncated, info["simulation_failed"]) == (False, True, True)
+    assert observation[5] == 1e30
+    assert np.isfinite(env.reset()[0]).all()
+
+
 def test_a_gymnasium_wrapper_rescales_the_action_for_a_learner() -> None:
     env = gymnasium.wrappers.RescaleAction(make(), np.float32(-1.0), np.float32(1.0))
     env.reset(seed=0)
