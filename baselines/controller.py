@@ -111,6 +111,7 @@ class PredictiveController(Controller):
     @final
     def reset(self) -> None:
         """Forgets the last plan and the statistics."""
+        # The last plan, its last move repeated N_c times, and the steps since it was made.
         self._schedule = np.zeros(2 * self.settings.control_horizon)
         self._schedule_age = self.settings.control_horizon
         self._solves = 0
