@@ -23,6 +23,7 @@ import gymnasium
 import mujoco
 import numpy as np
 import tyro
+from mujoco.batch import Batch
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
@@ -34,6 +35,8 @@ from baselines.controller import Controller, PredictiveController
 from baselines.linear_mpc import LinearMpc
 from baselines.mpc_settings import MpcSettings
 from baselines.nmpc_ipopt import WARM_BARRIER, IpoptNmpc
+from baselines.worker_pool import available_cores
+from crane_env.plant import build_model, place
 
 
 @dataclass(frozen=True)
@@ -281,10 +284,45 @@ def closed_loop_stretches(count: int, length: int) -> NDArray[np.float64]:
     return np.concatenate(stretches)
 
 
+VECTOR_SIZE = 1024
+"""Cranes of the section "vector"."""
+
+
+def benchmark_vector(rounds: int) -> list[Timing]:
+    """One crane's step among 1,024, against the bare batch and Gymnasium's AsyncVectorEnv.
+
+    All use all cores. The asynchronous environments are as many as are quickest per crane on few
+    cores; more cost the same per crane.
+    """
+    parameters = crane_env.CraneParameters()
+    cores = available_cores()
+    batch = Batch(build_model(parameters), VECTOR_SIZE, cores)
+    batch.bind("qpos")[:] = place(parameters).position
+    batch.forward()
+    action = np.random.default_rng(0).uniform(-0.1, 0.1, (VECTOR_SIZE, 1))
+    native = gymnasium.make_vec("OILCrane-v0", num_envs=VECTOR_SIZE, threads=cores)
+    native.reset(seed=0)
+    count = 8 * cores
+    processes = gymnasium.make_vec("OILCrane-v0", num_envs=count, vectorization_mode="async")
+    processes.reset(seed=0)
+    contestants: dict[str, Callable[[int], object]] = {
+        "mujoco.batch": lambda _: batch.step(None, parameters.substeps),
+        "make_vec": lambda _: native.step(action),
+        "AsyncVectorEnv": lambda _: processes.step(action[:count]),
+    }
+    cranes = {"mujoco.batch": VECTOR_SIZE, "make_vec": VECTOR_SIZE, "AsyncVectorEnv": count}
+    durations = in_turns(contestants, 5 * rounds, block=5)
+    processes.close()
+    per_crane = {name: seconds / cranes[name] for name, seconds in durations.items()}
+    promises = {"make_vec": "<= 1.25", "AsyncVectorEnv": ">= 4 make_vec"}
+    return timings(per_crane, "mujoco.batch", promises)
+
+
 SECTIONS: dict[str, Callable[[int], list[Timing]]] = {
     "environment": benchmark_environment,
     "linear": benchmark_linear,
     "solvers": benchmark_solvers,
+    "vector": benchmark_vector,
 }
 
 

@@ -57,7 +57,7 @@ class Options:
         figures: whether to draw the figures.
     """
 
-    controllers: tuple[str, ...] = ("manual", "linear", "adaptive")
+    controllers: tuple[str, ...] = ("manual", "linear", "adaptive", "nmpc-a", "nmpc-b", "ltv")
     operators: tuple[str, ...] = ("table1",)
     seeds: tuple[str, ...] = ("0",)
     parameters: str = "paper"
