@@ -6,13 +6,16 @@ RUN := $(VENV)/bin/python
 PIP := $(RUN) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help evaluate test check benchmark clean
+.PHONY: help evaluate reproduce test check benchmark clean
 
 help:  ## Lists the commands.
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 evaluate: $(VENV)/run.stamp  ## Drives the ten manoeuvres of Table I; results in results/evaluate.
 	$(RUN) scripts/evaluate.py $(ARGS)
+
+reproduce: $(VENV)/run.stamp  ## Puts the paper to the test; verdicts and report in results/paper.
+	$(RUN) scripts/reproduce_paper.py $(ARGS)
 
 test: $(VENV)/dev.stamp check  ## Runs the linters and all tests.
 	$(RUN) -m pytest $(ARGS)

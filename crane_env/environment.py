@@ -263,10 +263,10 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         return {**self.__dict__, "_renderer": None}
 
     def _checked(self, action: NDArray[Any]) -> float:
-        array = np.asarray(action, dtype=np.float64)
+        array = np.asarray(action)
         if array.shape != (1,):
             raise ValueError(f"An action has shape (1,), not {array.shape}.")
-        asked = float(array[0])
+        asked = float(array.item())
         if not math.isfinite(asked):
             raise ValueError(f"An action must be a finite acceleration, not {asked} m/s^2.")
         return asked

@@ -227,11 +227,14 @@ class Plant:
         setpoint_rate, _, _, _, drum_rate = velocity
         data, begin = self.data, self.data.time
         travel = self._drives.travel(setpoint, setpoint_rate, acceleration)
-        hoist = self._drives.hoist(drum, drum_rate, hoist_reference)
-        self._velocity[DRUM] = hoist.rate
+        hoist_acceleration, drum_middle = 0.0, drum
+        if hoist_reference or drum_rate:  # else the hoist stays at rest, as it is most of the time
+            hoist = self._drives.hoist(drum, drum_rate, hoist_reference)
+            self._velocity[DRUM] = hoist.rate
+            hoist_acceleration, drum_middle = hoist.acceleration, hoist.middle
         self._control[0] = travel.acceleration
-        self._control[1] = hoist.acceleration
-        self._set_cable_gains(hoist.middle)
+        self._control[1] = hoist_acceleration
+        self._set_cable_gains(drum_middle)
         mujoco.mj_step(self.model, data, nstep=self._substeps)
         if data.time <= begin:
             # MuJoCo has counted a diverged state and gone on from the model's origin at time 0.
@@ -242,7 +245,7 @@ class Plant:
 
     def _set_cable_gains(self, unstretched_length: float) -> None:
         parameters = self.parameters
-        self._cable_gains[:] = cable_gains(
+        _, self._cable_gains[1], self._cable_gains[2] = cable_gains(
             parameters.cable_stiffness, parameters.cable_damping, unstretched_length
         )
 

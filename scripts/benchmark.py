@@ -22,6 +22,7 @@ from typing import Annotated, Any
 import gymnasium
 import mujoco
 import numpy as np
+import rich.box
 import tyro
 from mujoco.batch import Batch
 from numpy.typing import NDArray
@@ -222,7 +223,9 @@ def benchmark_solvers(rounds: int) -> list[Timing]:
     for name in SOLVERS:
         begin = perf_counter()
         try:
-            controllers[name] = build(name)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # peers warn of what they lack
+                controllers[name] = build(name)
         except ImportError as error:
             if name not in PEERS:
                 raise
@@ -328,12 +331,12 @@ SECTIONS: dict[str, Callable[[int], list[Timing]]] = {
 
 def show(title: str, rows: Sequence[Timing], console: Console) -> None:
     """Prints one section as a table."""
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", box=rich.box.SIMPLE)
     solved = any(row.build is not None for row in rows)
     headings = ["", "median [us]", "p99 [us]", "max [us]", "ratio", "promised"]
     headings += ["build [s]", "iterations", "> 20 ms"] if solved else []
     for heading in headings:
-        table.add_column(heading, justify="right" if heading else "left")
+        table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
     for row in rows:
         times = (f"{1e6 * t:.1f}" for t in (row.median, row.p99, row.maximum))
         cells = [row.name, *times, f"{row.ratio:.3g}", row.allowed]
@@ -363,7 +366,8 @@ def main(arguments: Arguments) -> int:
         what = f"Unknown section {unknown[0]!r}" if unknown else "rounds must be at least 1"
         print(f"{what}; valid sections: {', '.join(SECTIONS)}.", file=sys.stderr)
         return 2
-    console = Console()
+    # Wide enough for the widest section, wherever the output goes.
+    console = Console(width=110, soft_wrap=True)
     console.print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores")
     results: dict[str, Any] = {}
     for name in arguments.sections:
