@@ -57,7 +57,7 @@ class Options:
     paper leaves open, and random manoeuvres of the same family. Prints the verdicts; writes a
     report (Markdown), all findings and indices (JSON, Parquet) and the paper's Figs. 3 to 7 (PNG).
     Ctrl-C keeps the finished episodes, and the same command then goes on from there. All of it
-    takes about 20 minutes on two cores and 200 MB.
+    takes about 20 minutes on two cores and 300 MB.
 
     Attributes:
         grid: other readings to try: none, single (one open point at a time), or full (pairs too),

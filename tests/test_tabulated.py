@@ -31,7 +31,7 @@ from baselines.tabulated import (
 )
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
-from scripts.tabulate import (
+from scripts.table_memory import (
     LENGTH_GRIDS,
     LENGTH_RATE_GRIDS,
     PAGE,

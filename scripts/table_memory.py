@@ -1,6 +1,6 @@
 """Measures the cost tables of `tabulated` and `tabulated-ltv`: error against memory.
 
-    python scripts/tabulate.py
+    python scripts/table_memory.py
 
 Writes the tables of docs/tabulated.md and the figure beside it.
 """
