@@ -26,6 +26,8 @@ CONTROLLERS: dict[str, str] = {
     "tabulated-ltv": "baselines.tabulated:tabulated_ltv",
     "linear-cvxpy": "baselines.equation6:linear_cvxpy",
     "adaptive-cvxpy": "baselines.equation6:adaptive_cvxpy",
+    "ppo": "baselines.onnx_policy:ppo",
+    "sac": "baselines.onnx_policy:sac",
 }
 """Name of each controller and where its factory (crane, settings) -> Controller is."""
 

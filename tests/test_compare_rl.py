@@ -1,0 +1,56 @@
+"""The comparison of learners and MPCs, small."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+from baselines import make_controller
+from crane_env import run_episode
+from scripts.compare_rl import MARKER, main
+
+
+def test_the_report_keeps_its_text_and_has_the_indices_of_every_controller(tmp_path: Path) -> None:
+    report = tmp_path / "report.md"
+    report.write_text(f"# Findings\n\nWritten by hand.\n\n{MARKER}\n\nstale rows", encoding="utf-8")
+    arguments = ["--runs", str(tmp_path / "none"), "--controllers", "adaptive", "ppo"]
+    arguments += ["--manoeuvres", "2", "--shifted-manoeuvres", "2"]
+    arguments += ["--output", str(tmp_path / "episodes"), "--report", str(report)]
+    assert main(arguments) == 0
+    text = report.read_text(encoding="utf-8")
+    assert text.startswith("# Findings\n\nWritten by hand.")
+    assert "stale rows" not in text.partition(MARKER)[2]
+    for name in ("adaptive", "ppo"):
+        found = re.search(rf"^\| {name} \| ([\d.]+) \| ([\d.]+) \|", text, re.MULTILINE)
+        assert found is not None
+        indices = []
+        for number in range(1, 11):
+            env = gymnasium.make("OILCrane-v0", operator=f"table1:{number}")
+            metrics = run_episode(env, make_controller(name), seed=0).metrics()
+            indices.append((metrics.IAE, metrics.release_drift))
+        assert [float(x) for x in found.groups()] == pytest.approx(np.mean(indices, 0), abs=6e-4)
+
+
+def test_the_shipped_ppo_policy_beats_the_adaptive_mpc_on_table_1() -> None:
+    means = {}
+    for name in ("adaptive", "ppo"):
+        controller = make_controller(name)
+        indices = []
+        for number in range(1, 11):
+            env = gymnasium.make("OILCrane-v0", operator=f"table1:{number}")
+            metrics = run_episode(env, controller, seed=0).metrics()
+            assert metrics.limit_violations == 0
+            indices.append((metrics.IAE, metrics.release_drift))
+        means[name] = np.mean(indices, axis=0)
+    assert (means["ppo"] < means["adaptive"]).all()
+
+
+def test_a_comparison_without_its_reference_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--controllers", "ppo", "--output", str(tmp_path)]) == 2
+    assert "controllers must include 'adaptive'" in capsys.readouterr().err
