@@ -287,6 +287,14 @@ def closed_loop_stretches(count: int, length: int) -> NDArray[np.float64]:
     return np.concatenate(stretches)
 
 
+def resident_memory() -> int:
+    """Memory of this process that is in use [byte]; 0 where the system does not tell."""
+    status = Path("/proc/self/statm")
+    if not status.exists():
+        return 0
+    return int(status.read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
 VECTOR_SIZE = 1024
 """Cranes of the section "vector"."""
 
@@ -303,8 +311,11 @@ def benchmark_vector(rounds: int) -> list[Timing]:
     batch.bind("qpos")[:] = place(parameters).position
     batch.forward()
     action = np.random.default_rng(0).uniform(-0.1, 0.1, (VECTOR_SIZE, 1))
+    before = resident_memory()
     native = gymnasium.make_vec("OILCrane-v0", num_envs=VECTOR_SIZE, threads=cores)
     native.reset(seed=0)
+    native.step(action)
+    print(f"make_vec takes {(resident_memory() - before) / VECTOR_SIZE / 1e3:.1f} kB a crane.")
     count = 8 * cores
     processes = gymnasium.make_vec("OILCrane-v0", num_envs=count, vectorization_mode="async")
     processes.reset(seed=0)
