@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
+from crane_env.fields import from_fields
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
 
@@ -68,19 +69,12 @@ class MpcSettings:
         Raises:
             ValueError: an unknown setting, or a value that makes no sense.
         """
-        if value is None:
-            return cls()
-        if isinstance(value, cls):
-            return value
-        if not isinstance(value, Mapping):
-            raise ValueError(
-                f"MPC settings must be MpcSettings or a mapping, not {type(value).__name__}."
-            )
-        unknown = sorted(set(value) - set(cls.__dataclass_fields__))
-        if unknown:
-            valid = ", ".join(cls.__dataclass_fields__)
-            raise ValueError(f"Unknown MPC setting {unknown[0]!r}; valid: {valid}.")
-        return cls(**value)
+        return from_fields(
+            cls,
+            value,
+            must_be="MPC settings must be MpcSettings or a mapping",
+            unknown="Unknown MPC setting",
+        )
 
     def acceleration_range(self, crane: CraneParameters) -> tuple[float, float]:
         """Lowest and highest trolley acceleration on this crane [m/s^2]."""

@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from crane_env.fields import from_fields
+
 
 @dataclass(frozen=True, kw_only=True)
 class CraneParameters:
@@ -147,24 +149,16 @@ class CraneParameters:
         Raises:
             ValueError: an unknown preset or field name, or a value out of range.
         """
-        if value is None:
-            return cls()
-        if isinstance(value, cls):
-            return value
         if isinstance(value, str):
             if value not in PRESETS:
                 raise ValueError(f"Unknown crane preset {value!r}; valid: {', '.join(PRESETS)}.")
             return PRESETS[value]
-        if not isinstance(value, Mapping):
-            raise ValueError(
-                f"Crane parameters must be CraneParameters, a mapping or a preset's name, "
-                f"not {type(value).__name__}."
-            )
-        names = [field.name for field in dataclasses.fields(cls)]
-        unknown = sorted(set(value) - set(names))
-        if unknown:
-            raise ValueError(f"Unknown crane parameter {unknown[0]!r}; valid: {', '.join(names)}.")
-        return cls(**value)
+        return from_fields(
+            cls,
+            value,
+            must_be="Crane parameters must be CraneParameters, a mapping or a preset's name",
+            unknown="Unknown crane parameter",
+        )
 
     @property
     def substeps(self) -> int:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from crane_env.fields import from_fields
 from crane_env.parameters import CraneParameters
 
 Range = tuple[float, float]
@@ -64,19 +65,12 @@ class Randomisation:
         Raises:
             ValueError: an unknown field, or a range that is none.
         """
-        if value is None:
-            return cls()
-        if isinstance(value, cls):
-            return value
-        if not isinstance(value, Mapping):
-            raise ValueError(
-                f"A randomisation must be a Randomisation or a mapping, not {type(value).__name__}."
-            )
-        unknown = sorted(set(value) - set(cls.__dataclass_fields__))
-        if unknown:
-            valid = ", ".join(cls.__dataclass_fields__)
-            raise ValueError(f"Unknown randomisation field {unknown[0]!r}; valid: {valid}.")
-        return cls(**value)
+        return from_fields(
+            cls,
+            value,
+            must_be="A randomisation must be a Randomisation or a mapping",
+            unknown="Unknown randomisation field",
+        )
 
     @property
     def ranges(self) -> dict[str, Range]:

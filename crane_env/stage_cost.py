@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
+from crane_env.fields import from_fields
 from crane_env.kinematics import Scalars, sway_displacement
 
 SwayTerm = Literal["displacement", "angle", "printed"]
@@ -64,19 +65,12 @@ class StageCost:
         Raises:
             ValueError: an unknown field, or a value out of range.
         """
-        if value is None:
-            return cls()
-        if isinstance(value, cls):
-            return value
-        if not isinstance(value, Mapping):
-            raise ValueError(
-                f"A stage cost must be a StageCost or a mapping, not {type(value).__name__}."
-            )
-        unknown = sorted(set(value) - set(cls.__dataclass_fields__))
-        if unknown:
-            valid = ", ".join(cls.__dataclass_fields__)
-            raise ValueError(f"Unknown stage cost field {unknown[0]!r}; valid: {valid}.")
-        return cls(**value)
+        return from_fields(
+            cls,
+            value,
+            must_be="A stage cost must be a StageCost or a mapping",
+            unknown="Unknown stage cost field",
+        )
 
     def terms(
         self,
