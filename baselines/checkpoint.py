@@ -54,7 +54,7 @@ class Progress:
 
     Attributes:
         steps: environment steps.
-        seconds: spent training, all sessions together, evaluations included [s].
+        seconds: spent training, resumes included, evaluations included [s].
         curve: validations so far, in order.
         best: weights of the best policy so far, a state dictionary; None before the first one.
     """
