@@ -35,6 +35,14 @@ def measured_cable_rate(observation: Observation) -> float:
     return observation.cable_rate
 
 
+def assumed_length(observation: Observation, length_min: float) -> float:
+    """Measured cable length, but no shorter than the hoist's upper limit switch allows [m].
+
+    Shorter readings come from a slack cable or a poor sensor, and model (3) is singular at 0.
+    """
+    return max(observation.cable_length, length_min)
+
+
 def hoist_stop_time(
     cable_length: float, cable_rate: float, length_min: float, length_max: float
 ) -> float:

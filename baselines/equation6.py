@@ -25,8 +25,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.cable_prediction import assumed_length
 from baselines.controller import Plan, PredictiveController
-from baselines.linear_mpc import assumed_length
 from baselines.mpc_settings import MpcSettings
 from crane_env.extras import require
 from crane_env.observation import Observation

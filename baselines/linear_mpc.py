@@ -21,6 +21,7 @@ from typing import NamedTuple, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.cable_prediction import assumed_length
 from baselines.controller import Plan, PredictiveController
 from baselines.mpc_settings import MpcSettings
 from baselines.pendulum_prediction import PendulumPrediction
@@ -105,14 +106,6 @@ class FixedCost:
     def cost(self, observation: Observation) -> QuadraticCost:
         """The cost from here; see `CostModel`."""
         return QuadraticCost(self._hessian, np.dot(observation, self._gradients))
-
-
-def assumed_length(observation: Observation, length_min: float) -> float:
-    """Measured cable length, but no shorter than the hoist's upper limit switch allows [m].
-
-    Shorter readings come from a slack cable or a poor sensor, and model (3) is singular at 0.
-    """
-    return max(observation.cable_length, length_min)
 
 
 @final

@@ -13,9 +13,9 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.cable_prediction import assumed_length
 from baselines.controller import Plan, PredictiveController
 from baselines.crane_model import sway_step
-from baselines.linear_mpc import assumed_length
 from baselines.mpc_settings import MpcSettings
 from baselines.nonlinear_prediction import numpy_on_symbols
 from crane_env.extras import require

@@ -24,9 +24,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.cable_prediction import CableRate, cable_intervals, hoist_stop_time
+from baselines.cable_prediction import (
+    CableRate,
+    assumed_length,
+    cable_intervals,
+    hoist_stop_time,
+)
 from baselines.crane_model import sway_step
-from baselines.linear_mpc import assumed_length
 from baselines.mpc_settings import MpcSettings
 from crane_env.extras import require
 from crane_env.kinematics import payload_velocity, sway_displacement

@@ -20,7 +20,7 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
-from baselines.cable_prediction import hoist_stop_time
+from baselines.cable_prediction import assumed_length, hoist_stop_time
 from baselines.cost_table import Axis, CostTable, node_cost
 from baselines.linear_mpc import LinearMpc, QuadraticCost, adaptive_cost, move_cost
 from baselines.ltv import time_varying_cost
@@ -86,7 +86,7 @@ class AdaptiveTable:
 
     def cost(self, observation: Observation) -> QuadraticCost:
         """The cost at this length; see `CostModel`."""
-        length = max(observation.cable_length, self._length_min)
+        length = assumed_length(observation, self._length_min)
         return self._table.cost((math.log(length),), observation)
 
 
@@ -148,7 +148,7 @@ class TimeVaryingTable:
 
     def cost(self, observation: Observation) -> QuadraticCost:
         """The cost at this length and rate; see `CostModel`."""
-        length, rate = max(observation.cable_length, self._length_min), observation.cable_rate
+        length, rate = assumed_length(observation, self._length_min), observation.cable_rate
         rises, speed = rate < 0.0, abs(rate)
         stop_time = hoist_stop_time(length, rate, self._length_min, self._length_max)
         if stop_time < self._horizon:

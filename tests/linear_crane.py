@@ -3,14 +3,47 @@
 from __future__ import annotations
 
 import numpy as np
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from baselines.controller import Controller
 from baselines.mpc_settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 
 Vector = NDArray[np.float64]
+
+
+def act(controller: Controller, observation: Observation) -> float:
+    """The controller's answer [m/s^2]."""
+    return float(controller.act(np.array(observation))[0])
+
+
+def observations(highest_cable_rate: float) -> st.SearchStrategy[Observation]:
+    """Observations far beyond what an episode shows, hoisting up to a rate [m/s]."""
+    return st.builds(
+        lambda velocity, length, rate, sway, sway_rate, reference: Observation(
+            1.0, velocity, length, rate, sway, sway_rate, reference, rate
+        ),
+        velocity=st.floats(-2.5, 2.5),
+        length=st.floats(0.5, 15.0),
+        rate=st.floats(-highest_cable_rate, highest_cable_rate),
+        sway=st.floats(-1.0, 1.0),
+        sway_rate=st.floats(-2.0, 2.0),
+        reference=st.sampled_from([-1.0, 0.0, 1.0]),
+    )
+
+
+def mirrored(seen: Observation) -> Observation:
+    """What a crane built the other way round would show."""
+    return seen._replace(
+        trolley_position=-seen.trolley_position,
+        trolley_velocity=-seen.trolley_velocity,
+        sway_angle=-seen.sway_angle,
+        sway_rate=-seen.sway_rate,
+        travel_reference=-seen.travel_reference,
+    )
 
 
 def observe(

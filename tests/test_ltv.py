@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 
 import crane_env
 from baselines.controller import Controller
-from baselines.linear_mpc import LinearMpc, adaptive
+from baselines.linear_mpc import adaptive
 from baselines.ltv import ltv, time_varying_cost
 from baselines.mpc_settings import MpcSettings
 from baselines.nmpc import nmpc_b
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
-from tests.linear_crane import random_observation
+from tests.linear_crane import act, mirrored, observations, random_observation
 
 CRANE = CraneParameters()
 READINGS = [
@@ -28,10 +28,6 @@ READINGS = [
     for term, tail in itertools.product(("displacement", "angle", "printed"), ("hold", "zero"))
 ]
 CONTROLLERS = [ltv(CRANE, reading) for reading in READINGS]
-
-
-def act(controller: LinearMpc, observation: Observation) -> float:
-    return float(controller.act(np.array(observation))[0])
 
 
 @pytest.mark.parametrize("reading", READINGS)
@@ -69,22 +65,11 @@ def test_the_hessian_is_symmetric_and_at_least_lambda_u(
     assert np.linalg.eigvalsh(hessian).min() > weight - 1e-9
 
 
-@given(
-    velocity=st.floats(-2.5, 2.5),
-    length=st.floats(0.5, 15.0),
-    rate=st.floats(-1.0, 1.0),
-    sway=st.floats(-1.0, 1.0),
-    sway_rate=st.floats(-2.0, 2.0),
-    reference=st.sampled_from([-1.0, 0.0, 1.0]),
-)
+@given(observations(highest_cable_rate=1.0))
 @settings(max_examples=100, deadline=None)
-def test_a_mirrored_observation_gives_a_mirrored_action(
-    velocity: float, length: float, rate: float, sway: float, sway_rate: float, reference: float
-) -> None:
-    seen = Observation(1.0, velocity, length, rate, sway, sway_rate, reference, rate)
-    mirrored = Observation(-1.0, -velocity, length, rate, -sway, -sway_rate, -reference, rate)
+def test_a_mirrored_observation_gives_a_mirrored_action(seen: Observation) -> None:
     for controller in CONTROLLERS:
-        assert act(controller, mirrored) == pytest.approx(-act(controller, seen), abs=1e-9)
+        assert act(controller, mirrored(seen)) == pytest.approx(-act(controller, seen), abs=1e-9)
 
 
 def test_copies_and_pickles_act_the_same() -> None:
