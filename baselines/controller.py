@@ -13,8 +13,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.mpc_settings import MpcSettings
-from baselines.trolley_limits import TrolleyLimits
+from baselines.mpc.limits import TrolleyLimits
+from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 

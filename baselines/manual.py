@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.controller import Controller, finite_observation
-from baselines.mpc_settings import MpcSettings
+from baselines.mpc.settings import MpcSettings
 from crane_env.parameters import CraneParameters
 
 

@@ -7,27 +7,27 @@ from collections.abc import Mapping
 from typing import Any
 
 from baselines.controller import Controller
-from baselines.mpc_settings import MpcSettings
+from baselines.mpc.settings import MpcSettings
 from crane_env.parameters import CraneParameters
 
 CONTROLLERS: dict[str, str] = {
     "manual": "baselines.manual:manual",
-    "linear": "baselines.linear_mpc:linear",
-    "adaptive": "baselines.linear_mpc:adaptive",
-    "nmpc-a": "baselines.nmpc:nmpc_a",
-    "nmpc-b": "baselines.nmpc:nmpc_b",
-    "nmpc-a-rti": "baselines.nmpc:nmpc_a_rti",
-    "nmpc-b-rti": "baselines.nmpc:nmpc_b_rti",
-    "nmpc-a-ipopt": "baselines.nmpc_ipopt:nmpc_a_ipopt",
-    "nmpc-b-ipopt": "baselines.nmpc_ipopt:nmpc_b_ipopt",
-    "nmpc-a-do-mpc": "baselines.nmpc_do_mpc:nmpc_a_do_mpc",
-    "ltv": "baselines.ltv:ltv",
-    "tabulated": "baselines.tabulated:tabulated",
-    "tabulated-ltv": "baselines.tabulated:tabulated_ltv",
-    "linear-cvxpy": "baselines.equation6:linear_cvxpy",
-    "adaptive-cvxpy": "baselines.equation6:adaptive_cvxpy",
-    "ppo": "baselines.onnx_policy:ppo",
-    "sac": "baselines.onnx_policy:sac",
+    "linear": "baselines.mpc.linear:linear",
+    "adaptive": "baselines.mpc.linear:adaptive",
+    "nmpc-a": "baselines.mpc.nonlinear:nmpc_a",
+    "nmpc-b": "baselines.mpc.nonlinear:nmpc_b",
+    "nmpc-a-rti": "baselines.mpc.nonlinear:nmpc_a_rti",
+    "nmpc-b-rti": "baselines.mpc.nonlinear:nmpc_b_rti",
+    "nmpc-a-ipopt": "baselines.mpc.ipopt_form:nmpc_a_ipopt",
+    "nmpc-b-ipopt": "baselines.mpc.ipopt_form:nmpc_b_ipopt",
+    "nmpc-a-do-mpc": "baselines.mpc.do_mpc_form:nmpc_a_do_mpc",
+    "ltv": "baselines.mpc.ltv:ltv",
+    "tabulated": "baselines.mpc.tabulated:tabulated",
+    "tabulated-ltv": "baselines.mpc.tabulated:tabulated_ltv",
+    "linear-cvxpy": "baselines.mpc.cvxpy_form:linear_cvxpy",
+    "adaptive-cvxpy": "baselines.mpc.cvxpy_form:adaptive_cvxpy",
+    "ppo": "baselines.rl.onnx_policy:ppo",
+    "sac": "baselines.rl.onnx_policy:sac",
 }
 """Name of each controller and where its factory (crane, settings) -> Controller is."""
 

@@ -7,25 +7,25 @@ from __future__ import annotations
 
 import gymnasium
 
-from crane_env.button_script import ButtonScript, read_script, write_script
-from crane_env.episode import Controller, Trajectory, run_episode
-from crane_env.manoeuvre import RandomManoeuvre
-from crane_env.metrics import Metrics
+from crane_env.episode.metrics import Metrics
+from crane_env.episode.play import Controller, Trajectory, run_episode
 from crane_env.observation import CraneState, Observation
-from crane_env.operator import ButtonEvent, Buttons, Operator
-from crane_env.operators import make_operator
+from crane_env.operators.base import ButtonEvent, Buttons, Operator
+from crane_env.operators.manoeuvre import RandomManoeuvre
+from crane_env.operators.registry import make_operator
+from crane_env.operators.script import ButtonScript, read_script, write_script
+from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
+from crane_env.operators.table1 import Table1Manoeuvre
 from crane_env.parameters import CraneParameters
-from crane_env.semi_markov import ButtonHabits, RandomButtons
 from crane_env.stage_cost import StageCost
-from crane_env.table1 import Table1Manoeuvre
 
 EPISODE_STEPS = 1250
 """Control steps of one episode: 25 s at 20 ms; the last event of Table I is at 17.75 s."""
 
 gymnasium.register(
     id="OILCrane-v0",
-    entry_point="crane_env.environment:OILCraneEnv",
-    vector_entry_point="crane_env.vector_environment:OILCraneVectorEnv",
+    entry_point="crane_env.environment.single:OILCraneEnv",
+    vector_entry_point="crane_env.environment.vector:OILCraneVectorEnv",
     max_episode_steps=EPISODE_STEPS,
     # The checker repeats on every step what the tests prove once; it costs as much as the physics.
     disable_env_checker=True,

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from crane_env.fields import from_fields
+from crane_env.support.fields import from_fields
 
 
 @dataclass(frozen=True, kw_only=True)

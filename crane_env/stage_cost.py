@@ -16,8 +16,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
-from crane_env.fields import from_fields
 from crane_env.kinematics import Scalars, sway_displacement
+from crane_env.support.fields import from_fields
 
 SwayTerm = Literal["displacement", "angle", "printed"]
 

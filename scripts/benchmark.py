@@ -31,13 +31,13 @@ from rich.table import Table
 
 import crane_env
 from baselines import make_controller
-from baselines.cable_prediction import measured_cable_rate
 from baselines.controller import Controller, PredictiveController
-from baselines.linear_mpc import LinearMpc
-from baselines.mpc_settings import MpcSettings
-from baselines.nmpc_ipopt import WARM_BARRIER, IpoptNmpc
-from baselines.worker_pool import available_cores
-from crane_env.plant import build_model, place
+from baselines.evaluation.worker_pool import available_cores
+from baselines.mpc.ipopt_form import WARM_BARRIER, IpoptNmpc
+from baselines.mpc.linear import LinearMpc
+from baselines.mpc.prediction.cable import measured_cable_rate
+from baselines.mpc.settings import MpcSettings
+from crane_env.plant.single import build_model, place
 
 
 @dataclass(frozen=True)

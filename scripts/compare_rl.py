@@ -23,18 +23,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines import make_controller
-from baselines.comparison import compare
-from baselines.episode_spec import EpisodeSpec, Setup, episode_specs
-from baselines.learning_figure import draw_learning
-from baselines.results import EpisodeResult, ResultsFolder
-from baselines.statistics import paired_difference
-from baselines.validation import VALIDATION, VALIDATION_SEEDS, drive
-from baselines.worker_pool import available_cores
+from baselines.evaluation.comparison import compare
+from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
+from baselines.evaluation.learning_figure import draw_learning
+from baselines.evaluation.results import EpisodeResult, ResultsFolder
+from baselines.evaluation.statistics import paired_difference
+from baselines.evaluation.worker_pool import available_cores
+from baselines.rl.validation import VALIDATION, VALIDATION_SEEDS, drive
 from crane_env import CraneParameters
-from crane_env.extras import require
-from crane_env.operators import OperatorSpec
+from crane_env.operators.registry import OperatorSpec
+from crane_env.operators.table1 import TABLE_1
 from crane_env.stage_cost import StageCost
-from crane_env.table1 import TABLE_1
+from crane_env.support.extras import require
 
 PROGRAM = "compare_rl.py"
 
@@ -122,7 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def training_sections(options: Options) -> list[str]:
     """Cost and outcome of every training run, and the learning curves."""
-    from baselines.training_recorder import CURVE, read_curve
+    from baselines.rl.recorder import CURVE, read_curve
 
     cards = sorted(options.runs.glob("*/policy.json"))
     if not cards:

@@ -16,18 +16,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from baselines.command_line import failure_lines, interrupt_once, progress, table_console
-from baselines.comparison import check_controllers, compare
-from baselines.episode_spec import EpisodeSpec, Setup, episode_specs
-from baselines.gallery import draw_gallery
-from baselines.mpc_settings import MpcSettings
-from baselines.results import EpisodeResult, ResultsFolder
-from baselines.tables import operator_table, summary_table
-from baselines.worker_pool import available_cores
+from baselines.evaluation.command_line import failure_lines, interrupt_once, progress, table_console
+from baselines.evaluation.comparison import check_controllers, compare
+from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
+from baselines.evaluation.gallery import draw_gallery
+from baselines.evaluation.results import EpisodeResult, ResultsFolder
+from baselines.evaluation.tables import operator_table, summary_table
+from baselines.evaluation.worker_pool import available_cores
+from baselines.mpc.settings import MpcSettings
 from crane_env import CraneParameters
-from crane_env.extras import require
+from crane_env.operators.table1 import TABLE_1
 from crane_env.parameters import PRESETS
-from crane_env.table1 import TABLE_1
+from crane_env.support.extras import require
 
 PROGRAM = "evaluate.py"
 

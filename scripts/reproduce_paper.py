@@ -16,12 +16,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.claim_checks import PAPER_MPCS
-from baselines.command_line import failure_lines, interrupt_once, progress, table_console
-from baselines.comparison import check_controllers
-from baselines.evidence import Evidence, measured_indices
-from baselines.gallery import draw_gallery
-from baselines.reproduction import (
+from baselines.evaluation.command_line import failure_lines, interrupt_once, progress, table_console
+from baselines.evaluation.comparison import check_controllers
+from baselines.evaluation.gallery import draw_gallery
+from baselines.evaluation.results import EpisodeResult, write_json
+from baselines.evaluation.worker_pool import available_cores
+from baselines.paper.checks import PAPER_MPCS
+from baselines.paper.evidence import Evidence, measured_indices
+from baselines.paper.report import (
+    markdown_report,
+    pair_summary,
+    plain_data,
+    verdict_summary,
+)
+from baselines.paper.sensitivity import Grid, Variation, variations
+from baselines.paper.stages import (
     Reproduction,
     Stage,
     default_evidence,
@@ -34,17 +43,8 @@ from baselines.reproduction import (
     timing_stage,
     varied_evidence,
 )
-from baselines.reproduction_report import (
-    markdown_report,
-    pair_summary,
-    plain_data,
-    verdict_summary,
-)
-from baselines.results import EpisodeResult, write_json
-from baselines.sensitivity import Grid, Variation, variations
-from baselines.worker_pool import available_cores
-from crane_env.atomic_file import PARTIAL_SUFFIX, atomic_file
-from crane_env.extras import require
+from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file
+from crane_env.support.extras import require
 
 PROGRAM = "reproduce_paper.py"
 

@@ -15,15 +15,15 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.cable_prediction import hoist_stop_time
-from baselines.figures import save_figure
-from baselines.linear_mpc import CostModel, adaptive_cost
-from baselines.ltv import time_varying_cost
-from baselines.mpc_settings import MpcSettings
-from baselines.table_error import first_move_errors
-from baselines.tabulated import AdaptiveTable, LengthGrid, LengthRateGrid, TimeVaryingTable
-from crane_env.atomic_file import atomic_file
+from baselines.evaluation.figures import save_figure
+from baselines.mpc.linear import CostModel, adaptive_cost
+from baselines.mpc.ltv import time_varying_cost
+from baselines.mpc.prediction.cable import hoist_stop_time
+from baselines.mpc.settings import MpcSettings
+from baselines.mpc.table_error import first_move_errors
+from baselines.mpc.tabulated import AdaptiveTable, LengthGrid, LengthRateGrid, TimeVaryingTable
 from crane_env.parameters import CraneParameters
+from crane_env.support.atomic_file import atomic_file
 
 PAGE = Path(__file__).parent.parent / "docs" / "tabulated.md"
 CRANE = CraneParameters()

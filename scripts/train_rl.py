@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from baselines.training_settings import TrainingSettings
-from crane_env.extras import require
+from baselines.rl.settings import TrainingSettings
+from crane_env.support.extras import require
 
 PROGRAM = "train_rl.py"
 
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         tyro = require("tyro", extra="results")
         options: Options = tyro.cli(Options, args=arguments, prog=PROGRAM)
         if options.export is not None:
-            from baselines.policy_export import export_file
+            from baselines.rl.export import export_file
 
             export_file(options.export, options.policy, options.algorithm, command)
             print(f"Policy: {options.policy}, card: {options.policy.with_suffix('.json')}.")
@@ -116,9 +116,9 @@ def all_settings(options: Options) -> list[TrainingSettings]:
 
 def run(settings: TrainingSettings, folder: Path, command: Sequence[str]) -> None:
     """Trains behind a progress bar, exports the policy and says what it reached."""
-    from baselines.policy_export import export_policy, write_card
-    from baselines.training import train
-    from baselines.validation import Validation
+    from baselines.rl.export import export_policy, write_card
+    from baselines.rl.training import train
+    from baselines.rl.validation import Validation
 
     progress_module = require("rich.progress", extra="results")
     console = require("rich.console", extra="results").Console(stderr=True)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from baselines import make_controller
 from baselines.manual import Manual
 from crane_env.parameters import CraneParameters
-from tests.linear_crane import observe
+from tests.mpc.prediction.linear_crane import observe
 
 
 def act(controller: Manual, velocity: float, reference: float) -> float:

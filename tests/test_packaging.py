@@ -41,7 +41,12 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_wheel_carries_the_model_and_the_type_marker(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
-    assert {"crane_env/crane.xml", "crane_env/py.typed", "baselines/py.typed"} <= names
+    assert {
+        "crane_env/plant/crane.xml",
+        "baselines/rl/policies/ppo.onnx",
+        "crane_env/py.typed",
+        "baselines/py.typed",
+    } <= names
     assert not any(name.startswith(("tests", "scripts")) for name in names)
 
 

@@ -1,0 +1,1 @@
+"""Evaluation: many episodes played side by side, kept, compared, tabulated and drawn."""

@@ -1,0 +1,185 @@
+"""Episode specification: all that determines one episode, as plain data.
+
+An episode is a pure function of its specification and the code, up to the time that `act` takes.
+So a specification has a key, a digest of both, under which the episode can be stored, found again,
+and played by another process or machine.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import importlib.util
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+from baselines.evaluation.provenance import code_identity
+from baselines.mpc.settings import MpcSettings
+from baselines.registry import CONTROLLERS, make_controller
+from crane_env import CraneParameters, Trajectory, make_operator, run_episode
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """What all episodes of a comparison have in common.
+
+    Attributes:
+        parameters: the crane, and the crane that the controllers believe in.
+        settings: the controllers' optimal control problem; its cost is also the reward's.
+        max_steps: end of the episode [control periods], if before the environment's own.
+
+    Raises:
+        ValueError: `max_steps` is no whole number of at least 1.
+    """
+
+    parameters: CraneParameters = field(default_factory=CraneParameters)
+    settings: MpcSettings = field(default_factory=MpcSettings)
+    max_steps: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuses an episode without steps."""
+        steps = self.max_steps
+        if steps is not None and (type(steps) is not int or steps < 1):
+            raise ValueError(f"max_steps must be a whole number of at least 1, not {steps!r}.")
+
+    @functools.cached_property
+    def key(self) -> str:
+        """Digest of the setup and the code, 12 hexadecimal digits."""
+        return digest([dataclasses.asdict(self), code_identity()])[:12]
+
+    @classmethod
+    def of(cls, mapping: Mapping[str, Any]) -> Setup:
+        """Reads what `dataclasses.asdict` and JSON made of a setup."""
+        return cls(
+            parameters=CraneParameters.of(mapping["parameters"]),
+            settings=MpcSettings.of(mapping["settings"]),
+            max_steps=mapping["max_steps"],
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeSpec:
+    """One episode.
+
+    Attributes:
+        controller: its name, as `make_controller` takes it.
+        operator: its program with all fields, as `make_operator` takes it: a script's file need not
+            be there any more.
+        seed: of the environment's reset.
+        setup: crane, settings and length.
+    """
+
+    controller: str
+    operator: Mapping[str, Any]
+    seed: int
+    setup: Setup
+
+    @property
+    def operator_name(self) -> str:
+        """The operator's name: "table1:3", "random", ..."""
+        return str(self.operator["name"])
+
+    @functools.cached_property
+    def key(self) -> str:
+        """Digest of the specification and the code, 12 hexadecimal digits."""
+        own = [self.controller, factory_identity(self.controller), self.operator, self.seed]
+        return digest([own, self.setup.key])[:12]
+
+    @classmethod
+    def of(cls, mapping: Mapping[str, Any]) -> EpisodeSpec:
+        """Reads what `dataclasses.asdict` and JSON made of a specification."""
+        return cls(**{**mapping, "setup": Setup.of(mapping["setup"])})
+
+
+def episode_specs(
+    controllers: Iterable[str], operators: Iterable[str], seeds: Iterable[int], setup: Setup
+) -> list[EpisodeSpec]:
+    """All combinations, controller by controller, then operator by operator.
+
+    Args:
+        controllers: names that `make_controller` knows.
+        operators: names that `make_operator` knows.
+        seeds: seeds of the environment, at least 0.
+        setup: what all episodes have in common.
+
+    Raises:
+        ValueError: an unknown operator, a malformed script, a negative seed, or nothing to play.
+        FileNotFoundError: a script that is not there.
+    """
+    programs = [operator_program(name) for name in dict.fromkeys(operators)]
+    distinct_seeds = list(dict.fromkeys(seeds))
+    if any(seed < 0 for seed in distinct_seeds):
+        raise ValueError(f"A seed is a whole number of at least 0, not {min(distinct_seeds)}.")
+    specs = [
+        EpisodeSpec(controller=controller, operator=program, seed=seed, setup=setup)
+        for controller in dict.fromkeys(controllers)
+        for program in programs
+        for seed in distinct_seeds
+    ]
+    if not specs:
+        raise ValueError("There is nothing to play: name a controller, an operator and a seed.")
+    return specs
+
+
+def operator_program(name: str) -> dict[str, Any]:
+    """Program of an operator with all its fields, from its name.
+
+    Raises:
+        ValueError: an unknown name or a malformed script.
+        FileNotFoundError: a script that is not there.
+    """
+    program: Any = getattr(make_operator(name), "program")  # noqa: B009  names make programs
+    fields = dataclasses.asdict(program)
+    # Tuples become lists, so that a program is the same before and after its way through JSON.
+    plain: dict[str, Any] = json.loads(json.dumps(fields))
+    return plain
+
+
+def play(spec: EpisodeSpec) -> Trajectory:
+    """Plays an episode.
+
+    The controller answers once before it is reset and timed, so that act times contain no
+    compilation and no first touch of memory.
+
+    Raises:
+        ValueError: the specification asks for something that there is not.
+        ImportError: a package is missing; the message names the extra that brings it.
+    """
+    setup = spec.setup
+    controller = make_controller(
+        spec.controller, parameters=setup.parameters, settings=setup.settings
+    )
+    env = gymnasium.make(
+        "OILCrane-v0",
+        operator=spec.operator,
+        parameters=setup.parameters,
+        cost=setup.settings.cost,
+    )
+    try:
+        observation, _ = env.reset(seed=spec.seed)
+        controller.act(observation)
+        return run_episode(env, controller, seed=spec.seed, max_steps=setup.max_steps)
+    finally:
+        env.close()
+
+
+@functools.cache
+def factory_identity(controller: str) -> str:
+    """Digest of the file of a controller that is none of the registry's; empty for those."""
+    if controller in CONTROLLERS:
+        return ""
+    found = importlib.util.find_spec(controller.partition(":")[0])
+    if found is None or found.origin is None:
+        return ""
+    return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()
+
+
+def digest(data: Any) -> str:
+    """SHA-256 of plain data, in hexadecimal digits; equal data has equal digests."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,98 @@
+"""Small dense quadratic program, solved by DAQP; a failure is data, not an exception.
+
+    minimise    1/2 x' H x + f' x
+    subject to  lower <= (x, A x) <= upper
+
+with x of shape (n,), H positive definite, A of shape (m, n) and bounds of shape (n + m,).
+
+DAQP (Arnström, Bemporad and Axehill, IEEE Trans. Autom. Control 67(8), 2022) is a dual active-set
+method: its solution is exact to rounding. Every solve starts cold, so that an answer depends on the
+question alone; at this size a warm start saves nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crane_env.support.extras import require
+
+
+class QpSolution(NamedTuple):
+    """What the solver found.
+
+    Attributes:
+        minimiser: x, shape (n,); None if the solver failed.
+        multipliers: of the n + m constraints, > 0 at an upper and < 0 at a lower bound, shape
+            (n + m,); H x + f + (I, A')' multipliers = 0. Meaningless if the solver failed.
+        iterations: active sets tried.
+        exit_flag: DAQP's: 1 optimal, -1 infeasible, -2 cycling, -3 unbounded, -4 out of
+            iterations, -5 H not positive definite, -6 overdetermined start.
+    """
+
+    minimiser: NDArray[np.float64] | None
+    multipliers: NDArray[np.float64]
+    iterations: int
+    exit_flag: int
+
+
+class QuadraticProgram:
+    """Programs that share the matrix A.
+
+    Args:
+        matrix: A, shape (m, n).
+
+    Raises:
+        ImportError: DAQP is not installed; the message names the extra.
+    """
+
+    def __init__(self, matrix: NDArray[np.float64]) -> None:
+        self._solve = require("daqp", extra="mpc").solve
+        self._matrix = np.ascontiguousarray(matrix, dtype=np.float64)
+        # DAQP's code 0 for each constraint: an inequality that the cold start takes as inactive.
+        self._kinds = np.zeros(sum(self._matrix.shape), dtype=np.intc)
+
+    def solve(
+        self,
+        hessian: NDArray[np.float64],
+        gradient: NDArray[np.float64],
+        lower: NDArray[np.float64],
+        upper: NDArray[np.float64],
+    ) -> QpSolution:
+        """Solves one program.
+
+        Args:
+            hessian: H, shape (n, n), positive definite.
+            gradient: f, shape (n,).
+            lower: bounds of (x, A x), shape (n + m,).
+            upper: likewise, at least `lower`.
+        """
+        # DAQP reads H by its address alone: a view with strides would be another matrix.
+        minimiser, _, exit_flag, info = self._solve(
+            np.ascontiguousarray(hessian),
+            gradient,
+            self._matrix,
+            upper,
+            lower,
+            self._kinds,
+            primal_tol=FEASIBILITY_TOLERANCE,
+            iter_limit=ITERATION_LIMIT,
+        )
+        # Poisoned data leave DAQP "optimal" with a minimiser that is not finite.
+        usable = exit_flag == OPTIMAL and all(map(math.isfinite, minimiser.tolist()))
+        return QpSolution(
+            minimiser if usable else None, info["lam"], int(info["iterations"]), int(exit_flag)
+        )
+
+
+OPTIMAL = 1
+"""DAQP's exit flag of an optimal solution."""
+
+FEASIBILITY_TOLERANCE = 1e-9
+"""Largest violation of an inactive constraint, in the constraint's unit."""
+
+ITERATION_LIMIT = 1000
+"""Active sets tried before a solve counts as failed; a few milliseconds."""

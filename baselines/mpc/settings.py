@@ -1,0 +1,97 @@
+"""Settings of the predictive controllers: horizons, cost, limits and the open points of eq. (6)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+from crane_env.parameters import CraneParameters
+from crane_env.stage_cost import StageCost
+from crane_env.support.fields import from_fields
+
+Tail = Literal["hold", "zero"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MpcSettings:
+    """One optimal control problem, shared by every predictive controller.
+
+    Attributes:
+        prediction_horizon: N_p [control periods].
+        control_horizon: N_c, number of free moves [control periods].
+        cost: weights and sway term of eq. (6).
+        tail: the input after N_c moves: "hold" the last move (the MPC convention) or "zero".
+        model_cable_length: constant length of the model of the linear MPC, ref. [18] [m].
+        acceleration_limits: lowest and highest trolley acceleration [m/s^2]; None: the crane's.
+        velocity_limits: lowest and highest trolley velocity [m/s]; None: the crane's.
+
+    Raises:
+        ValueError: a setting that makes no sense; the message names it and what is allowed.
+    """
+
+    prediction_horizon: int = 100
+    control_horizon: int = 10
+    cost: StageCost = field(default_factory=StageCost)
+    tail: Tail = "hold"
+    model_cable_length: float = 8.0
+    acceleration_limits: tuple[float, float] | None = None
+    velocity_limits: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuses settings that make no sense."""
+        for name in ("prediction_horizon", "control_horizon"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise ValueError(f"{name} must be a whole number of at least 1, not {value!r}.")
+        if self.control_horizon > self.prediction_horizon:
+            raise ValueError(
+                f"control_horizon ({self.control_horizon}) must not exceed "
+                f"prediction_horizon ({self.prediction_horizon})."
+            )
+        object.__setattr__(self, "cost", StageCost.of(self.cost))
+        if self.tail not in get_args(Tail):
+            raise ValueError(f"Unknown tail {self.tail!r}; valid: {', '.join(get_args(Tail))}.")
+        length = self.model_cable_length
+        is_number = isinstance(length, (int, float)) and not isinstance(length, bool)
+        if not is_number or not math.isfinite(length) or length <= 0.0:
+            raise ValueError(f"model_cable_length must be a positive length, not {length!r}.")
+        for name in ("acceleration_limits", "velocity_limits"):
+            limits = getattr(self, name)
+            if limits is not None:
+                object.__setattr__(self, name, _checked_limits(name, limits))
+
+    @classmethod
+    def of(cls, value: MpcSettings | Mapping[str, Any] | None) -> MpcSettings:
+        """Reads settings from themselves, a mapping of their fields, or None (the paper's).
+
+        Raises:
+            ValueError: an unknown setting, or a value that makes no sense.
+        """
+        return from_fields(
+            cls,
+            value,
+            must_be="MPC settings must be MpcSettings or a mapping",
+            unknown="Unknown MPC setting",
+        )
+
+    def acceleration_range(self, crane: CraneParameters) -> tuple[float, float]:
+        """Lowest and highest trolley acceleration on this crane [m/s^2]."""
+        return self.acceleration_limits or (-crane.acceleration_max, crane.acceleration_max)
+
+    def velocity_range(self, crane: CraneParameters) -> tuple[float, float]:
+        """Lowest and highest trolley velocity on this crane [m/s]."""
+        return self.velocity_limits or (-crane.trolley_speed_max, crane.trolley_speed_max)
+
+
+def _checked_limits(name: str, limits: Any) -> tuple[float, float]:
+    try:
+        low, high = (float(limit) for limit in limits)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a pair of numbers, not {limits!r}.") from None
+    if not low < high or not low <= 0.0 <= high or math.isinf(high - low):
+        raise ValueError(
+            f"{name} must be a low and a higher finite limit that allow rest (0), not {limits!r}."
+        )
+    return low, high

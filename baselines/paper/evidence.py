@@ -1,0 +1,110 @@
+"""Evidence: what was measured under one setup, in the form in which claims are judged.
+
+Every controller meets the same manoeuvres, and every index of every controller is one array over
+them. Beside the manoeuvres as they are there may be the same ones without hoisting, and episodes
+that were played one at a time, whose act times no other episode disturbed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.evaluation.episode_spec import Setup
+from baselines.evaluation.results import EpisodeResult, ResultsFolder
+from baselines.paper.oscillation import Oscillation, short_cable_oscillation
+from crane_env.operators.press import Press, press_events
+from crane_env.operators.script import ButtonScript
+from crane_env.operators.table1 import TABLE_1
+
+Indices = Mapping[str, Mapping[str, NDArray[np.float64]]]
+"""Controller to index to one value a manoeuvre."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What was measured under one setup.
+
+    Attributes:
+        setup: the crane and the controllers' optimal control problem.
+        indices: of the manoeuvres as they are: fields of `Metrics`, and where trajectories were
+            kept those of `Oscillation` as "short_cable_error" and "short_cable_swing".
+        steady: of the same manoeuvres without hoisting.
+        timed: of episodes that were played one at a time.
+    """
+
+    setup: Setup
+    indices: Indices
+    steady: Indices = dataclasses.field(default_factory=dict)
+    timed: Indices = dataclasses.field(default_factory=dict)
+
+    def of(self, controller: str, index: str) -> NDArray[np.float64]:
+        """One index of one controller, shape (number of manoeuvres,)."""
+        return self.indices[controller][index]
+
+    def stack(self, controllers: Sequence[str], index: str) -> NDArray[np.float64]:
+        """One index of several controllers, shape (controllers, manoeuvres)."""
+        return np.array([self.of(controller, index) for controller in controllers])
+
+
+def measured_indices(
+    results: Sequence[EpisodeResult], folder: ResultsFolder, traced: Sequence[str] = ()
+) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """Indices of episodes that all finished, ordered within each controller as they come.
+
+    Args:
+        results: of a comparison.
+        folder: where it was kept.
+        traced: controllers whose trajectories were kept, for their `Oscillation`.
+
+    Raises:
+        ValueError: an episode failed.
+        FileNotFoundError: a trajectory that should have been kept is not there.
+    """
+    rows: dict[str, list[dict[str, float]]] = {}
+    for result in results:
+        if result.metrics is None:
+            raise ValueError(f"{result.spec.controller} failed: {result.failure}")
+        row = result.metrics.as_dict()
+        if result.spec.controller in traced:
+            oscillation = short_cable_oscillation(folder.trajectory(result.spec))
+            row |= {
+                f"short_cable_{name}": value
+                for name, value in zip(Oscillation._fields, oscillation, strict=True)
+            }
+        rows.setdefault(result.spec.controller, []).append(row)
+    return {
+        controller: {name: np.array([row[name] for row in own], dtype=float) for name in own[0]}
+        for controller, own in rows.items()
+    }
+
+
+def steady_manoeuvre(number: int) -> dict[str, Any]:
+    """Program of a manoeuvre of Table I without its hoisting, for `EpisodeSpec`.
+
+    Args:
+        number: 1 to 10.
+    """
+    times = TABLE_1[number - 1]
+    events = press_events([Press("forward", times.travel_press, times.travel_release)])
+    script = ButtonScript(tuple(events), f"script:table1-{number}-without-hoisting")
+    program: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(script)))
+    return program
+
+
+def plain(indices: Indices) -> dict[str, dict[str, list[float | None]]]:
+    """Indices as JSON knows them, with null for NaN."""
+    return {
+        controller: {
+            index: [None if math.isnan(value) else value for value in values.tolist()]
+            for index, values in own.items()
+        }
+        for controller, own in indices.items()
+    }

@@ -1,0 +1,1 @@
+"""Reinforcement learning: training environments, learners, and their policies as controllers."""

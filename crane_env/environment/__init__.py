@@ -1,0 +1,1 @@
+"""The Gymnasium faces of the crane: one, or many that step together."""

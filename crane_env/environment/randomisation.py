@@ -1,0 +1,109 @@
+"""Domain randomisation: ranges from which each episode's crane is drawn.
+
+A quantity without a range keeps the crane's own value. Payload mass and initial length are uniform
+within their ranges; cable stiffness and drive bandwidth, which differ between cranes by factors,
+are log-uniform. The four are independent.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crane_env.parameters import CraneParameters
+from crane_env.support.fields import from_fields
+
+Range = tuple[float, float]
+"""Lowest and highest value."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Randomisation:
+    """Ranges of the crane parameters that differ from episode to episode.
+
+    Attributes:
+        payload_mass: [kg], uniform.
+        cable_length_initial: [m], uniform.
+        cable_stiffness: K_l [N], log-uniform.
+        drive_bandwidth: [rad/s], log-uniform, above 0.
+
+    Raises:
+        ValueError: a range that is no pair of finite numbers in order, or not positive.
+    """
+
+    payload_mass: Range | None = None
+    cable_length_initial: Range | None = None
+    cable_stiffness: Range | None = None
+    drive_bandwidth: Range | None = None
+
+    def __post_init__(self) -> None:
+        """Brings the ranges into their form, or refuses them."""
+        for field in dataclasses.fields(self):
+            given = getattr(self, field.name)
+            if given is None:
+                continue
+            try:
+                low, high = (float(value) for value in given)
+            except (TypeError, ValueError):
+                low = high = math.nan
+            if not 0.0 < low <= high < math.inf:
+                raise ValueError(
+                    f"{field.name} must be a range (low, high) of positive numbers in order, "
+                    f"not {given!r}."
+                )
+            object.__setattr__(self, field.name, (low, high))
+
+    @classmethod
+    def of(cls, value: Randomisation | Mapping[str, Any] | None) -> Randomisation:
+        """Reads ranges from themselves, a mapping of fields, or None: nothing is randomised.
+
+        Raises:
+            ValueError: an unknown field, or a range that is none.
+        """
+        return from_fields(
+            cls,
+            value,
+            must_be="A randomisation must be a Randomisation or a mapping",
+            unknown="Unknown randomisation field",
+        )
+
+    @property
+    def ranges(self) -> dict[str, Range]:
+        """The ranges given, by name of the crane parameter."""
+        given = ((field.name, getattr(self, field.name)) for field in dataclasses.fields(self))
+        return {name: value for name, value in given if value is not None}
+
+    def check(self, parameters: CraneParameters) -> None:
+        """Makes sure that every crane that can be drawn is one.
+
+        Raises:
+            ValueError: an end of a range is out of the crane's limits; the message says which.
+        """
+        for end in range(2):
+            values = {name: bounds[end] for name, bounds in self.ranges.items()}
+            dataclasses.replace(parameters, **values)
+
+    def draw(self, rng: np.random.Generator, parameters: CraneParameters) -> CraneParameters:
+        """Draws a crane; without ranges it is the one given and nothing is drawn.
+
+        Args:
+            rng: source of the numbers.
+            parameters: the crane whose values the quantities without a range keep.
+        """
+        values = {}
+        for name, (low, high) in self.ranges.items():
+            share = rng.random()
+            if name in _LOG_UNIFORM:
+                value = low * (high / low) ** share
+            else:
+                value = low + (high - low) * share
+            values[name] = min(max(value, low), high)
+        return dataclasses.replace(parameters, **values) if values else parameters
+
+
+_LOG_UNIFORM = frozenset({"cable_stiffness", "drive_bandwidth"})

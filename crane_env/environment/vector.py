@@ -1,0 +1,432 @@
+"""OILCrane-v0 many times over: cranes and operators that step together, as a VectorEnv."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from numbers import Integral
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.spaces import Box
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from crane_env.environment.randomisation import Randomisation
+from crane_env.environment.single import ACTION_ROUNDING
+from crane_env.environment.vector_info import lay_out, lay_out_objects
+from crane_env.environment.vector_reset import chosen_by, seeds_of_each, starts_of_each
+from crane_env.kinematics import payload_position, payload_velocity
+from crane_env.observation import CraneState, observation_space
+from crane_env.operators.base import Operator
+from crane_env.operators.batch import VectorOperator, VectorOperatorSpec, make_operators
+from crane_env.parameters import CraneParameters
+from crane_env.plant.batch import VectorDriveReport, VectorPlant
+from crane_env.plant.single import place
+from crane_env.stage_cost import StageCost
+
+if TYPE_CHECKING:
+    from crane_env.rendering.vector_rendering import VectorRenderer
+
+CraneSpec = CraneParameters | Mapping[str, Any] | str | None
+"""What `CraneParameters.of` reads."""
+
+
+class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any]]):
+    """N operator-in-the-loop overhead cranes that step together.
+
+    Crane i does exactly what `OILCraneEnv`, reset with seed + i, does: same observations bit for
+    bit, same rewards up to rounding of the sine. Spaces, time, reward and starting state are
+    described there.
+
+    ## Resets and seeds
+
+    As in Gymnasium's `SyncVectorEnv`: the three autoreset modes (an ended crane begins its next
+    episode in the step after, in the same step, or when `reset` is called with its bit set in
+    `options["reset_mask"]`), `seed` an integer (crane i gets seed + i) or a list. A value among the
+    reset options is for all cranes, or an array of shape (N,); `operator` may be a list or tuple
+    of N descriptions.
+
+    ## Info
+
+    The keys of `OILCraneEnv` in Gymnasium's vector layout: an array of shape (N,) for each key, and
+    under "_" and the key the mask of the cranes that have it. `buttons` is a boolean array of shape
+    (N, 4), in the order of `Buttons`.
+
+    ## Episode end
+
+    Truncated after `max_episode_steps`. A crane that is driven until its simulation diverges (a
+    payload thrown over the girder can do that) stays where it was before the step, its episode is
+    truncated too, and `info` has `simulation_failed`. Not terminated: rewards are negative, and a
+    learner would learn to crash. The other cranes do not notice.
+
+    ## Domain randomisation
+
+    Off by default. Cranes may differ for good (`parameters` a list), and from episode to episode
+    (`randomisation`, drawn from the crane's own seed). The operator's presses are drawn apart: with
+    and without randomisation the same numbers stand behind them. `cranes` has the parameters of the
+    present episodes.
+
+    Args:
+        num_envs: number of cranes, N.
+        operator: as for `OILCraneEnv`; or a list or tuple of names, mappings, programs or
+            operators, one for each crane.
+        parameters: as for `OILCraneEnv`; or a list or tuple, one for each crane, that differ in
+            payload mass, cable stiffness, initial cable length and drive bandwidth only.
+        cost: weights of the stage cost; `StageCost` or a mapping of its fields.
+        randomisation: `Randomisation` or a mapping of its fields; None: nothing is randomised.
+        max_episode_steps: control steps after which an episode is truncated; None or -1: never.
+        autoreset_mode: an `AutoresetMode` or its value: "NextStep", "SameStep", "Disabled".
+        threads: that step the cranes; 0: one for each processor.
+        render_mode: None or "rgb_array" (a tuple of N pictures from `render`).
+        render_width: width of a picture [pixel].
+        render_height: height of a picture [pixel].
+
+    Raises:
+        ValueError: an unknown name or a value out of range; the message says what is allowed.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["rgb_array"],
+        "render_fps": 50,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        *,
+        num_envs: int = 1,
+        operator: VectorOperatorSpec = "random",
+        parameters: CraneSpec | Sequence[CraneSpec] = None,
+        cost: StageCost | Mapping[str, Any] | None = None,
+        randomisation: Randomisation | Mapping[str, Any] | None = None,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int = 0,
+        render_mode: str | None = None,
+        render_width: int = 960,
+        render_height: int = 720,
+    ) -> None:
+        super().__init__()
+        self.num_envs = _count("num_envs", num_envs)
+        endless = max_episode_steps is None or max_episode_steps == -1
+        self.max_episode_steps = None if endless else _count("max_episode_steps", max_episode_steps)
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"Unknown render_mode {render_mode!r}; valid: None, rgb_array.")
+        self.render_mode = render_mode
+        self.render_width = render_width
+        self.render_height = render_height
+        self.cost = StageCost.of(cost)
+        self.randomisation = Randomisation.of(randomisation)
+        self._own_parameters = _cranes(parameters, self.num_envs)
+        for crane in set(self._own_parameters):
+            self.randomisation.check(crane)
+        self.parameters = self._own_parameters[0]
+        self.plant = VectorPlant(self._own_parameters, threads=threads)
+        self._default_operators = make_operators(operator, self.num_envs)
+        self._operator = VectorOperator(self.num_envs)
+
+        frames = round(1.0 / self.parameters.control_period)
+        self.metadata = {
+            **self.metadata,
+            "render_fps": frames,
+            "autoreset_mode": self.autoreset_mode,
+        }
+        limit = self.parameters.acceleration_max
+        self.single_action_space = Box(-limit, limit, (1,), dtype=np.float32)
+        self.single_observation_space = observation_space(self.parameters)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+
+        self._randoms: list[tuple[np.random.Generator, int] | None] = [None] * self.num_envs
+        self._step_index = np.zeros(self.num_envs, dtype=np.int64)
+        self._begun = np.zeros(self.num_envs, dtype=np.bool_)
+        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+        self._renderer: VectorRenderer | None = None
+
+    @property
+    def cranes(self) -> tuple[CraneParameters, ...]:
+        """Parameters of each crane in its present episode."""
+        return tuple(self.plant.cranes)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        """Begins episodes of all cranes, or of those in a mask.
+
+        Args:
+            seed: seeds the episodes from this one on; crane i gets seed + i or entry i of a list.
+            options: any of `RESET_STATE`, `operator` and `reset_mask` (bool, shape (N,)), for these
+                episodes only; what concerns cranes out of the mask is ignored.
+
+        Returns:
+            Observations, shape (N, 8), and info of the cranes that were reset.
+
+        Raises:
+            ValueError: an unknown option, a value out of range or an array of another shape; all
+                cranes stay as they were.
+            TypeError: a mask that is no boolean array.
+            ResetNeeded: a mask, before all cranes were reset once.
+        """
+        placed = dict(options or {})
+        chosen = np.ones(self.num_envs, dtype=np.bool_)
+        if "reset_mask" in placed:
+            chosen = chosen_by(placed.pop("reset_mask"), self.num_envs)
+            if not (self._begun | chosen).all():
+                raise ResetNeeded("Call reset without a reset_mask first.")
+        operators = self._default_operators
+        if "operator" in placed:
+            operators = make_operators(placed.pop("operator"), self.num_envs)
+        starts = starts_of_each(placed, chosen, self.parameters)
+        seeds = seeds_of_each(seed, self.num_envs)
+        indices = np.flatnonzero(chosen)
+        randoms = {
+            index: seeding.np_random(seeds[index])
+            for index in indices.tolist()
+            if seeds[index] is not None
+        }
+        for index, random in randoms.items():
+            self._randoms[index] = random
+        self._begin(indices, operators, starts)
+        states = self.plant.states()
+        return self._observe(states), lay_out(self._signals(states), chosen)
+
+    def step(
+        self, actions: NDArray[Any]
+    ) -> tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.bool_],
+        NDArray[np.bool_],
+        dict[str, Any],
+    ]:
+        """Drives each trolley with an acceleration for one control period.
+
+        Args:
+            actions: trolley accelerations [m/s^2], shape (N, 1). That of a crane which begins a new
+                episode in this step is ignored.
+
+        Raises:
+            ValueError: actions of another shape or not finite; all cranes stay as they were.
+            ResetNeeded: `reset` was not called, or not for a crane that has ended in the mode
+                "Disabled".
+        """
+        if not self._begun.all():
+            raise ResetNeeded("Call reset before step.")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
+            raise ResetNeeded(
+                f"The episode of environment {np.flatnonzero(self._ended)[0]} has ended: call "
+                'reset(options={"reset_mask": ...}) before step.'
+            )
+        moving = ~self._ended
+        asked = self._checked_actions(actions, moving)
+        limit = self.parameters.acceleration_max
+        command = np.clip(asked, -limit, limit)
+        travel_reference, hoist_reference = self._references()
+        drive = self.plant.step(command, hoist_reference, moving)
+        self._step_index += moving
+        states = self.plant.states()
+        times = np.multiply(self._step_index, self.parameters.control_period, dtype=np.float64)
+        self._operator.press(times, states, moving & ~drive.failed)
+
+        signals = self._signals(states)
+        earned = self._rewards(states, signals["payload_velocity"], travel_reference, drive)
+        rewards = np.where(moving, sum(earned.values()), 0.0)
+        earned["acceleration"] = drive.acceleration
+        earned["action_clipped"] = np.abs(asked - command) > ACTION_ROUNDING * limit
+        earned["drive_limited"] = drive.limited
+        if drive.failed.any():
+            earned["simulation_failed"] = drive.failed.copy()
+        terminations = np.zeros(self.num_envs, dtype=np.bool_)
+        truncations = drive.failed
+        if self.max_episode_steps is not None:
+            truncations |= moving & (self._step_index >= self.max_episode_steps)
+        self._ended = truncations.copy()
+
+        infos: dict[str, Any] = {}
+        beginning = ~moving
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
+            beginning, moving = self._ended.copy(), ~self._ended
+            infos |= lay_out_objects("final_obs", self._observe(states), beginning)
+            infos["final_info"] = lay_out({**signals, **earned}, beginning)
+            infos["_final_info"] = beginning.copy()
+        if beginning.any():
+            indices = np.flatnonzero(beginning)
+            self._begin(indices, self._default_operators, [{}] * len(indices))
+            states = self.plant.states()
+            signals = self._signals(states)
+        infos |= lay_out(signals, np.ones(self.num_envs, dtype=np.bool_))
+        infos |= lay_out(earned, moving)
+        return self._observe(states), rewards, terminations, truncations, infos
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Draws each crane as `OILCraneEnv.render` does.
+
+        Returns:
+            N pictures, uint8, shape (render_height, render_width, 3), in mode "rgb_array".
+
+        Raises:
+            RuntimeError: no OpenGL back end; the message says what to set and install.
+        """
+        if self.render_mode is None:
+            gymnasium.logger.warn(
+                "render() without a render_mode; use "
+                'gymnasium.make_vec(..., render_mode="rgb_array").'
+            )
+            return None
+        if self._renderer is None:
+            from crane_env.rendering.vector_rendering import VectorRenderer
+
+            self._renderer = VectorRenderer(
+                self.plant, width=self.render_width, height=self.render_height
+            )
+        return self._renderer.draw(self._operator.buttons, self.parameters.travel_speed)
+
+    def close_extras(self) -> None:
+        """Frees the graphics memory."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the graphics: a copy continues bit for bit and draws for itself."""
+        return {**self.__dict__, "_renderer": None}
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The generator of each crane, as of the cranes of a `SyncVectorEnv`."""
+        return tuple(self._random(index)[0] for index in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seed of each crane's generator."""
+        return tuple(self._random(index)[1] for index in range(self.num_envs))
+
+    def _random(self, index: int) -> tuple[np.random.Generator, int]:
+        seeded = self._randoms[index]
+        if seeded is None:
+            seeded = self._randoms[index] = seeding.np_random()
+        return seeded
+
+    def _begin(
+        self,
+        indices: NDArray[np.intp],
+        operators: Sequence[Operator],
+        starts: Sequence[Mapping[str, float]],
+    ) -> None:
+        """Begins an episode of each of some cranes, where its start says."""
+        cranes, streams = [], []
+        randomised = bool(self.randomisation.ranges)
+        for index in indices.tolist():
+            # One number an episode, as `OILCraneEnv` draws it; all else is drawn from others that
+            # it seeds.
+            number = int(self._random(index)[0].integers(2**63))
+            streams.append(np.random.default_rng(number))
+            crane = self._own_parameters[index]
+            if randomised:
+                crane = self.randomisation.draw(np.random.default_rng((number, 1)), crane)
+            cranes.append(crane)
+        self.plant.exchange(indices, cranes)
+        self.plant.reset(
+            indices, [place(crane, **start) for crane, start in zip(cranes, starts, strict=True)]
+        )
+        states = self.plant.states()
+        for index, crane, stream in zip(indices.tolist(), cranes, streams, strict=True):
+            start = CraneState(*states[index].tolist())
+            self._operator.reset(index, operators[index], stream, start, crane)
+        self._step_index[indices] = 0
+        self._begun[indices] = True
+        self._ended[indices] = False
+
+    def _references(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Travel and hoist references [m/s] that the operators ask for, eqs. (4) and (5)."""
+        return (
+            self._operator.travel * self.parameters.travel_speed,
+            self._operator.hoist * self.parameters.hoist_speed,
+        )
+
+    def _observe(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.column_stack((states, *self._references()))
+
+    def _signals(self, states: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+        """Info that describes the cranes as they are."""
+        position, rate, length, length_rate, sway, sway_rate = states.T
+        return {
+            "payload_position": payload_position(position, length, sway),
+            "payload_velocity": payload_velocity(rate, length, length_rate, sway, sway_rate),
+            "cable_tension": self.plant.cable_tension,
+            "buttons": self._operator.buttons.copy(),
+        }
+
+    def _rewards(
+        self,
+        states: NDArray[np.float64],
+        velocity: NDArray[np.float64],
+        travel_reference: NDArray[np.float64],
+        drive: VectorDriveReport,
+    ) -> dict[str, NDArray[Any]]:
+        """Terms of the reward, by their keys in `info`."""
+        terms = self.cost.terms(
+            velocity,
+            travel_reference,
+            states[:, CABLE_LENGTH],
+            states[:, SWAY_ANGLE],
+            drive.acceleration,
+        )
+        period = self.parameters.control_period
+        return {
+            f"reward_{name}": -period * term
+            for name, term in zip(terms._fields, terms, strict=True)
+        }
+
+    def _checked_actions(
+        self, actions: NDArray[Any], moving: NDArray[np.bool_]
+    ) -> NDArray[np.float64]:
+        array = np.asarray(actions, dtype=np.float64)
+        if array.shape != (self.num_envs, 1):
+            raise ValueError(f"Actions have shape ({self.num_envs}, 1), not {array.shape}.")
+        asked = np.where(moving, array[:, 0], 0.0)
+        bad = np.flatnonzero(~np.isfinite(asked))
+        if bad.size:
+            raise ValueError(
+                f"Environment {bad[0]}: An action must be a finite acceleration, "
+                f"not {asked[bad[0]]} m/s^2."
+            )
+        return asked
+
+
+CABLE_LENGTH = CraneState._fields.index("cable_length")
+SWAY_ANGLE = CraneState._fields.index("sway_angle")
+
+
+def _count(name: str, value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+        raise ValueError(f"{name} must be a positive whole number, not {value!r}.")
+    return int(value)
+
+
+def _autoreset_mode(value: AutoresetMode | str) -> AutoresetMode:
+    try:
+        return AutoresetMode(value)
+    except ValueError as error:
+        valid = ", ".join(mode.value for mode in AutoresetMode)
+        raise ValueError(f"Unknown autoreset_mode {value!r}; valid: {valid}.") from error
+
+
+def _cranes(given: CraneSpec | Sequence[CraneSpec], count: int) -> list[CraneParameters]:
+    specs: Any = given
+    if not isinstance(specs, (list, tuple)):
+        return [CraneParameters.of(specs)] * count
+    if len(specs) != count:
+        raise ValueError(
+            f"A list of parameters needs one for each of the {count} environments, "
+            f"not {len(specs)}."
+        )
+    return [CraneParameters.of(one) for one in specs]

@@ -1,0 +1,1 @@
+"""Episodes: played, recorded as trajectories, and measured."""

@@ -1,0 +1,158 @@
+"""Metrics of an episode: how well the payload followed the operator, how little it swung.
+
+With samples k = 0 ... N - 1 one control period T_s apart, payload position x_p, payload velocity y
+and travel reference w:
+
+    IAE             = sum_k |w(k) - y(k)| T_s
+    release_drift   = max over k >= r of d (x_p(k) - x_p(r))
+    rest_overshoot  = max over k >= r of d (x_p(k) - x_p(N - 1))
+
+where r is the release, the last step at which w turns to 0 for good, and d = sign w(r - 1) is the
+direction of travel. An episode that ends with a travel button pressed, or in which none was
+pressed, has no release: what depends on it is NaN.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from crane_env.episode.play import Trajectory
+
+SETTLING_BAND = 0.05
+"""Payload position counts as settled within this distance of its final value [m]."""
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Indices of one episode; NaN where the episode does not define one.
+
+    Attributes:
+        IAE: integral of |w - y| [m].
+        release_drift: farthest travel after the travel button's release [m].
+        rest_overshoot: farthest travel after the release beyond the final position [m].
+        settling_time: from the release until the payload stays within 50 mm of its final
+            position [s].
+        max_sway: largest |theta| [rad].
+        residual_sway: largest |theta| in the last sway period of the episode [rad].
+        peak_acceleration: largest |trolley acceleration| [m/s^2].
+        rms_acceleration: root mean square of the trolley acceleration [m/s^2].
+        slack_time: time with a slack cable [s].
+        limit_violations: steps on which the action was clipped, the drive overruled, or the
+            trolley faster than its limit [-].
+        stage_cost: minus the sum of the rewards [m^2/s].
+        act_median: median time of `act` [s].
+        act_p99: 99th percentile of the time of `act` [s].
+        act_max: longest `act` [s].
+        act_late: share of `act` calls longer than the control period [-].
+        solver_failures: solves that ended without a plan [-]; 0 for controllers that solve none.
+    """
+
+    IAE: float
+    release_drift: float
+    rest_overshoot: float
+    settling_time: float
+    max_sway: float
+    residual_sway: float
+    peak_acceleration: float
+    rms_acceleration: float
+    slack_time: float
+    limit_violations: int
+    stage_cost: float
+    act_median: float
+    act_p99: float
+    act_max: float
+    act_late: float
+    solver_failures: int
+
+    def __str__(self) -> str:
+        """One line an index."""
+        return "\n".join(f"{name:18s} {value:.6g}" for name, value in self.as_dict().items())
+
+    def as_dict(self) -> dict[str, float]:
+        """Index name to value."""
+        return dataclasses.asdict(self)
+
+
+def release_step(travel_reference: NDArray[np.float64]) -> int | None:
+    """First step of the final stretch without travel reference, shape (N,); None if there is none.
+
+    None too if no travel button was pressed before it.
+    """
+    pressed = np.flatnonzero(travel_reference)
+    if pressed.size == 0 or pressed[-1] == len(travel_reference) - 1:
+        return None
+    return int(pressed[-1]) + 1
+
+
+def integral_absolute_error(
+    travel_reference: NDArray[np.float64],
+    payload_velocity: NDArray[np.float64],
+    control_period: float,
+) -> float:
+    """Sum of |w - y| T_s over the episode [m]; arrays of shape (N,)."""
+    return float(np.abs(travel_reference - payload_velocity).sum() * control_period)
+
+
+def after_release(
+    travel_reference: NDArray[np.float64],
+    payload_position: NDArray[np.float64],
+    control_period: float,
+) -> tuple[float, float, float]:
+    """Release drift [m], rest overshoot [m] and settling time [s]; NaN without a release."""
+    release = release_step(travel_reference)
+    if release is None:
+        return math.nan, math.nan, math.nan
+    direction = np.sign(travel_reference[release - 1])
+    travelled = direction * payload_position[release:]
+    unsettled = np.flatnonzero(np.abs(travelled - travelled[-1]) > SETTLING_BAND)
+    settled = int(unsettled[-1]) + 1 if unsettled.size else 0
+    return (
+        float(travelled.max() - travelled[0]),
+        float(travelled.max() - travelled[-1]),
+        settled * control_period,
+    )
+
+
+def measure(trajectory: Trajectory) -> Metrics:
+    """All indices of an episode."""
+    parameters = trajectory.parameters
+    period = parameters.control_period
+    drift, overshoot, settling = after_release(
+        trajectory.travel_reference, trajectory.payload_position, period
+    )
+    last_period = parameters.sway_period(float(trajectory.cable_length[-1]))
+    last_samples = max(1, round(last_period / period))
+    too_fast = np.abs(trajectory.trolley_velocity) > parameters.trolley_speed_max + SPEED_TOLERANCE
+    violations = trajectory.action_clipped | trajectory.drive_limited | too_fast
+    act_time = trajectory.act_time
+    return Metrics(
+        IAE=integral_absolute_error(
+            trajectory.travel_reference, trajectory.payload_velocity, period
+        ),
+        release_drift=drift,
+        rest_overshoot=overshoot,
+        settling_time=settling,
+        max_sway=float(np.abs(trajectory.sway_angle).max()),
+        residual_sway=float(np.abs(trajectory.sway_angle[-last_samples:]).max()),
+        peak_acceleration=float(np.abs(trajectory.acceleration).max()),
+        rms_acceleration=float(np.sqrt(np.mean(trajectory.acceleration**2))),
+        slack_time=float(np.count_nonzero(trajectory.cable_tension == 0.0) * period),
+        limit_violations=int(np.count_nonzero(violations)),
+        stage_cost=-float(trajectory.reward.sum()),
+        act_median=float(np.median(act_time)),
+        act_p99=float(np.percentile(act_time, 99)),
+        act_max=float(act_time.max()),
+        act_late=float(np.mean(act_time > period)),
+        solver_failures=trajectory.solver_failures,
+    )
+
+
+SPEED_TOLERANCE = 0.02
+"""The trolley may exceed its setpoint by this much while its drive settles [m/s]."""

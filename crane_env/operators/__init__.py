@@ -1,0 +1,1 @@
+"""Operators: who presses the buttons."""

@@ -1,0 +1,115 @@
+"""Vector operator: the operators of many cranes, asked only when they have something to say.
+
+An operator that follows a schedule announces its next event (`ScheduledOperator.due`) and is not
+asked before; one that looks at the crane is asked at every control step. What is pressed is kept as
+arrays over the cranes.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crane_env.observation import CraneState
+from crane_env.operators.base import EVENT_TOLERANCE, Buttons, Operator, ScheduledOperator
+from crane_env.operators.registry import OperatorSpec, make_operator
+from crane_env.parameters import CraneParameters
+
+VectorOperatorSpec = OperatorSpec | Sequence[OperatorSpec]
+"""One description for all cranes, or a list or tuple with one for each."""
+
+
+def make_operators(spec: VectorOperatorSpec, count: int) -> list[Operator]:
+    """Makes an operator of its own for each crane.
+
+    Args:
+        spec: as for `make_operator`; or a list or tuple of names, mappings, programs or operators,
+            one for each crane. (A sequence of button events is one script, for all cranes.)
+        count: number of cranes.
+
+    Raises:
+        ValueError: as `make_operator`, or a list of another length.
+        FileNotFoundError: there is no such script.
+    """
+    given: Any = spec
+    if isinstance(given, (list, tuple)) and any(_describes_an_operator(one) for one in given):
+        if len(given) != count:
+            raise ValueError(
+                f"A list of operators needs one for each of the {count} environments, "
+                f"not {len(given)}."
+            )
+        return [_own(make_operator(one)) for one in given]
+    operator = make_operator(given)
+    return [_own(operator) for _ in range(count)]
+
+
+def _describes_an_operator(entry: object) -> bool:
+    """Whether an entry of a list stands for an operator; events are tuples and have none of it."""
+    return isinstance(entry, (str, Mapping)) or hasattr(entry, "events") or hasattr(entry, "press")
+
+
+def _own(operator: Operator) -> Operator:
+    """An operator that shares no state with the one given."""
+    if type(operator) is ScheduledOperator:
+        return ScheduledOperator(operator.program)
+    return copy.deepcopy(operator)
+
+
+class VectorOperator:
+    """The operators of many cranes and what they press.
+
+    Attributes:
+        buttons: pressed, in the order of `Buttons`, shape (N, 4).
+        travel: `Buttons.travel` of each crane, shape (N,).
+        hoist: `Buttons.hoist` of each crane, shape (N,).
+
+    Args:
+        count: number of cranes, N. An operator takes its place with `reset`.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.buttons = np.zeros((count, len(Buttons._fields)), dtype=np.bool_)
+        self.travel = np.zeros(count)
+        self.hoist = np.zeros(count)
+        self._operators: list[Operator | None] = [None] * count
+        self._due = np.full(count, np.inf)
+
+    def reset(
+        self,
+        index: int,
+        operator: Operator,
+        rng: np.random.Generator,
+        start: CraneState,
+        parameters: CraneParameters,
+    ) -> None:
+        """Begins an episode of one crane and reads its buttons at time 0; see `Operator.reset`."""
+        operator.reset(rng, start, parameters)
+        self._operators[index] = operator
+        self._ask(index, operator, 0.0, start)
+
+    def press(
+        self, times: NDArray[np.float64], states: NDArray[np.float64], live: NDArray[np.bool_]
+    ) -> None:
+        """Reads the buttons for the control periods that begin now.
+
+        Args:
+            times: since each episode's start [s], shape (N,).
+            states: fields of `CraneState`, shape (N, 6).
+            live: cranes whose episode goes on, shape (N,).
+        """
+        due = np.flatnonzero((self._due <= times + EVENT_TOLERANCE) & live)
+        for index in due.tolist():
+            operator = self._operators[index]
+            assert operator is not None, "a live crane has an operator"
+            self._ask(index, operator, float(times[index]), CraneState(*states[index].tolist()))
+
+    def _ask(self, index: int, operator: Operator, time: float, state: CraneState) -> None:
+        buttons = operator.press(time, state)
+        self.buttons[index] = buttons
+        self.travel[index] = buttons.travel
+        self.hoist[index] = buttons.hoist
+        self._due[index] = operator.due if isinstance(operator, ScheduledOperator) else -np.inf

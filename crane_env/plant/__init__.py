@@ -1,0 +1,1 @@
+"""The simulated crane: one, or a batch, with its drives."""

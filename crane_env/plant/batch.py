@@ -1,0 +1,255 @@
+"""Vector plant: many cranes in MuJoCo that advance together, each bit for bit as `Plant` does.
+
+The cranes share the equations of `Plant` and all parameters but `VARIABLE`. They are
+stepped on a pool of threads; the number of threads changes no bit of the result.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+from numpy.typing import NDArray
+
+from crane_env.observation import CraneState
+from crane_env.parameters import CraneParameters
+from crane_env.plant.drives import Drives
+from crane_env.plant.motion import ARRAYS, Stroke
+from crane_env.plant.single import (
+    DRIVE_ERROR,
+    DRUM,
+    REACH,
+    SETPOINT,
+    SWAY,
+    Coordinates,
+    Plant,
+    build_model,
+    cable_gains,
+    cable_pull,
+    drive_loops,
+    drum_stroke,
+    place,
+)
+
+VARIABLE = ("payload_mass", "cable_stiffness", "cable_length_initial", "drive_bandwidth")
+"""Parameters in which cranes that are stepped together may differ."""
+
+
+class VectorDriveReport(NamedTuple):
+    """What the drives did with their commands; see `DriveReport`.
+
+    Attributes:
+        acceleration: of each setpoint [m/s^2], shape (N,).
+        limited: whether a limit overruled the command, shape (N,).
+        failed: the simulation diverged; the crane is where it was before the step. Shape (N,).
+    """
+
+    acceleration: NDArray[np.float64]
+    limited: NDArray[np.bool_]
+    failed: NDArray[np.bool_]
+
+
+class VectorPlant:
+    """N cranes; advance by control periods.
+
+    Args:
+        cranes: parameters of each crane, alike but for `VARIABLE`.
+        threads: that step the cranes; 0: one for each processor.
+
+    Raises:
+        ValueError: no crane, cranes that differ in more than `VARIABLE`, or a negative number of
+            threads.
+    """
+
+    def __init__(self, cranes: Sequence[CraneParameters], *, threads: int = 0) -> None:
+        if not cranes:
+            raise ValueError("A vector plant needs at least one crane.")
+        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 0:
+            raise ValueError(
+                f"threads must be a positive whole number, or 0 for one for each processor, "
+                f"not {threads!r}."
+            )
+        self.threads = threads
+        self.cranes = [cranes[0]] * len(cranes)
+        model = build_model(cranes[0])
+        self._payload = model.body("payload").id
+        self._batch = Batch(model, len(cranes), threads)
+        self._position: NDArray[np.float64] = self._batch.bind("qpos")
+        self._velocity: NDArray[np.float64] = self._batch.bind("qvel")
+        self._control: NDArray[np.float64] = self._batch.bind("ctrl")
+        self._warnings: NDArray[np.int32] = self._batch.warning
+        cable = model.actuator("cable").id
+        self._cable_gains: NDArray[np.float64] = self._batch.expand("actuator_biasprm")[
+            :, cable, :3
+        ]
+        self._stiffness = np.full(len(cranes), cranes[0].cable_stiffness)
+        self._damping = cranes[0].cable_damping
+        stroke = drum_stroke(cranes[0])
+        self._drum_stroke = Stroke(
+            np.full(len(cranes), stroke.centre), np.full(len(cranes), stroke.half)
+        )
+        self._drives = Drives(cranes[0], self._drum_stroke, ARRAYS)
+        self._substeps = cranes[0].substeps
+        everyone = np.arange(len(cranes))
+        self.exchange(everyone, cranes)
+        self.reset(everyone, [place(crane) for crane in cranes])
+
+    def __len__(self) -> int:
+        """Number of cranes, N."""
+        return len(self.cranes)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Parameters and full integration states: a copy continues bit for bit."""
+        return {
+            "cranes": self.cranes,
+            "threads": self.threads,
+            "state": self._batch.state.copy(),
+            "gains": self._cable_gains.copy(),
+        }
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        """Rebuilds the batch and restores the states."""
+        self.__init__(saved["cranes"], threads=saved["threads"])  # type: ignore[misc]
+        self._batch.state[:] = saved["state"]
+        self._cable_gains[:] = saved["gains"]
+
+    def exchange(self, indices: NDArray[np.intp], cranes: Sequence[CraneParameters]) -> None:
+        """Gives cranes other parameters; they count from the next `reset` of the crane.
+
+        Args:
+            indices: which cranes, in ascending order.
+            cranes: their new parameters.
+
+        Raises:
+            ValueError: parameters that differ in more than `VARIABLE`; nothing is exchanged.
+        """
+        for crane in cranes:
+            check_alike(crane, self.cranes[0])
+        heavier = []
+        for index, crane in zip(indices.tolist(), cranes, strict=True):
+            present = self.cranes[index]
+            if crane is present:
+                continue
+            if crane.payload_mass != present.payload_mass:
+                self._batch.expand("body_mass")[index, self._payload] = crane.payload_mass
+                heavier.append(index)
+            if crane.drive_bandwidth != present.drive_bandwidth:
+                position_loop, velocity_loop = drive_loops(crane)
+                self._batch.expand("jnt_stiffness")[index, DRIVE_ERROR] = position_loop
+                self._batch.expand("dof_damping")[index, DRIVE_ERROR] = velocity_loop
+            self._stiffness[index] = crane.cable_stiffness
+            stroke = drum_stroke(crane)
+            self._drum_stroke.centre[index] = stroke.centre
+            self._drum_stroke.half[index] = stroke.half
+            self.cranes[index] = crane
+        if heavier:
+            self._batch.set_const(heavier)
+
+    def reset(self, indices: NDArray[np.intp], starts: Sequence[Coordinates]) -> None:
+        """Places cranes with their hoists at rest.
+
+        Args:
+            indices: which cranes, in ascending order.
+            starts: where each of them begins, from `place`.
+        """
+        self._batch.reset(indices, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        self._position[indices] = [start.position for start in starts]
+        self._velocity[indices] = [start.velocity for start in starts]
+        gains = cable_gains(self._stiffness[indices], self._damping, self._position[indices, DRUM])
+        for column, gain in enumerate(gains):
+            self._cable_gains[indices, column] = gain
+        self._batch.forward(indices)
+
+    def step(
+        self,
+        acceleration: NDArray[np.float64],
+        hoist_reference: NDArray[np.float64],
+        moving: NDArray[np.bool_],
+    ) -> VectorDriveReport:
+        """Advances one control period; see `Plant.step`.
+
+        Args:
+            acceleration: what each trolley drive is asked for, within its limit [m/s^2],
+                shape (N,).
+            hoist_reference: cable rates that the hoists ramp to [m/s], shape (N,).
+            moving: the cranes to advance; the others stay as they are. Shape (N,).
+        """
+        position, velocity = self._position.copy(), self._velocity.copy()
+        travel = self._drives.travel(position[:, SETPOINT], velocity[:, SETPOINT], acceleration)
+        hoist = self._drives.hoist(position[:, DRUM], velocity[:, DRUM], hoist_reference)
+        np.copyto(self._velocity[:, DRUM], hoist.rate, where=moving)
+        np.copyto(self._control[:, 0], travel.acceleration, where=moving)
+        np.copyto(self._control[:, 1], hoist.acceleration, where=moving)
+        gains = cable_gains(self._stiffness, self._damping, hoist.middle)
+        for column, gain in enumerate(gains):
+            np.copyto(self._cable_gains[:, column], gain, where=moving)
+        failed = np.zeros(len(self), dtype=np.bool_)
+        try:
+            self._batch.step(moving, self._substeps)
+        except SimulationError as error:
+            failed[error.ids] = True
+        if self._warnings.any():
+            # MuJoCo counts a diverged state and goes on from the model's origin.
+            failed |= moving & self._warnings.any(axis=(1, 2))
+        if failed.any():
+            self._position[failed] = position[failed]
+            self._velocity[failed] = velocity[failed]
+        return VectorDriveReport(travel.acceleration, travel.limited, failed)
+
+    def states(self) -> NDArray[np.float64]:
+        """Motion of each crane now, in the order of `CraneState`, shape (N, 6)."""
+        position, velocity = self._position, self._velocity
+        states = np.empty((len(self), len(CraneState._fields)))
+        np.add(position[:, SETPOINT], position[:, DRIVE_ERROR], out=states[:, 0])
+        np.add(velocity[:, SETPOINT], velocity[:, DRIVE_ERROR], out=states[:, 1])
+        states[:, 2] = position[:, REACH]
+        states[:, 3] = velocity[:, REACH]
+        states[:, 4] = position[:, SWAY]
+        states[:, 5] = velocity[:, SWAY]
+        return states
+
+    @property
+    def cable_tension(self) -> NDArray[np.float64]:
+        """Tensions of the cables [N]; exactly 0 when slack. Shape (N,)."""
+        position, velocity, gains = self._position, self._velocity, self._cable_gains
+        pull = cable_pull(
+            gains[:, 1],
+            gains[:, 2],
+            position[:, REACH],
+            velocity[:, REACH],
+            position[:, DRUM],
+            velocity[:, DRUM],
+        )
+        tension: NDArray[np.float64] = np.maximum(0.0, pull)
+        return tension
+
+    def copy_to(self, index: int, plant: Plant) -> None:
+        """Puts a plant of the same parameters into the state of one crane."""
+        signature = mujoco.mjtState.mjSTATE_INTEGRATION
+        mujoco.mj_setState(plant.model, plant.data, self._batch.state[index], signature)
+        plant.model.actuator("cable").biasprm[:3] = self._cable_gains[index]
+
+
+def check_alike(crane: CraneParameters, reference: CraneParameters) -> None:
+    """Makes sure that two cranes differ in `VARIABLE` only.
+
+    Raises:
+        ValueError: they do not; the message names the parameter.
+    """
+    if crane is reference:
+        return
+    for name in _SHARED:
+        if getattr(crane, name) != getattr(reference, name):
+            raise ValueError(
+                f"Cranes that are stepped together may differ in {', '.join(VARIABLE)}, not in "
+                f"{name} ({getattr(crane, name)!r} and {getattr(reference, name)!r})."
+            )
+
+
+_SHARED = tuple(
+    field.name for field in dataclasses.fields(CraneParameters) if field.name not in VARIABLE
+)

@@ -1,0 +1,131 @@
+"""Drives: what trolley drive and hoist make of their commands in one control period.
+
+With setpoint rate v and action u of the trolley, drum rate r and reference w_h of the hoist, and
+control period T, the rates one period on are
+
+    v+ = v + u T   within speed limit, ramp and limit switches,  and the setpoint accelerates at
+                   u, or at (v+ - v) / T where a limit overruled it
+    r+ = w_h       within ramp and limit switches,  and the drum accelerates at (r+ - r) / T.
+
+A hoist without a ramp steps: r is r+ from the start of the period. Drives work on floats for one
+crane and on arrays for many, bit for bit the same.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from crane_env.parameters import CraneParameters
+from crane_env.plant.motion import FLOATS, Arithmetic, Stroke, next_rate
+
+RATE_ROUNDING = 1e-12
+"""Differences of rates below this are rounding, not a limit [m/s]."""
+
+
+class DriveReport(NamedTuple):
+    """What the trolley drive did with a command; floats or arrays.
+
+    Attributes:
+        acceleration: mean acceleration of the trolley's setpoint over the period [m/s^2].
+        limited: whether the speed limit or a limit switch overruled the commanded acceleration.
+    """
+
+    acceleration: Any
+    limited: Any
+
+
+class HoistReport(NamedTuple):
+    """What the hoist does with its reference; floats or arrays.
+
+    Attributes:
+        rate: of the unstretched length at the start of the period [m/s].
+        acceleration: of the unstretched length over the period [m/s^2].
+        middle: unstretched length in the middle of the period [m], to second order in time.
+    """
+
+    rate: Any
+    acceleration: Any
+    middle: Any
+
+
+class Drives:
+    """Trolley drive and hoist of one crane, or of many that share all limits but the drum's.
+
+    Args:
+        parameters: limits, ramps and control period.
+        drum_stroke: unstretched lengths that the hoist's limit switches allow, floats or arrays.
+        arithmetic: `FLOATS` or `ARRAYS`.
+    """
+
+    __slots__ = (
+        "_acceleration_max",
+        "_arithmetic",
+        "_drum_stroke",
+        "_hoist_acceleration",
+        "_hoist_steps",
+        "_period",
+        "_rail_stroke",
+        "_speed_max",
+    )
+
+    def __init__(
+        self, parameters: CraneParameters, drum_stroke: Stroke, arithmetic: Arithmetic = FLOATS
+    ) -> None:
+        self._period = parameters.control_period
+        self._speed_max = parameters.trolley_speed_max
+        self._acceleration_max = parameters.acceleration_max
+        self._rail_stroke = Stroke(0.0, parameters.trolley_position_limit)
+        self._drum_stroke = drum_stroke
+        self._hoist_steps = parameters.hoist_ramp_time == 0.0
+        # A true step of the hoist reverses within one period at most.
+        self._hoist_acceleration = min(
+            parameters.hoist_acceleration, 2.0 * parameters.hoist_speed / parameters.control_period
+        )
+        self._arithmetic = arithmetic
+
+    def travel(self, position: Any, rate: Any, acceleration: Any) -> DriveReport:
+        """Drives the trolley.
+
+        Args:
+            position: of the setpoint [m].
+            rate: of the setpoint [m/s].
+            acceleration: asked for, within its limit [m/s^2].
+        """
+        minimum, maximum, _, _, where = self._arithmetic
+        wanted = rate + acceleration * self._period
+        reached = next_rate(
+            rate,
+            minimum(maximum(wanted, -self._speed_max), self._speed_max),
+            position=position,
+            stroke=self._rail_stroke,
+            acceleration=self._acceleration_max,
+            period=self._period,
+            arithmetic=self._arithmetic,
+        )
+        limited = abs(reached - wanted) > RATE_ROUNDING
+        return DriveReport(where(limited, (reached - rate) / self._period, acceleration), limited)
+
+    def hoist(self, length: Any, rate: Any, reference: Any) -> HoistReport:
+        """Winds the cable.
+
+        Args:
+            length: unstretched length [m].
+            rate: of the unstretched length [m/s].
+            reference: cable rate that the hoist ramps to, > 0 lengthens [m/s].
+        """
+        reached = next_rate(
+            rate,
+            reference,
+            position=length,
+            stroke=self._drum_stroke,
+            acceleration=self._hoist_acceleration,
+            period=self._period,
+            arithmetic=self._arithmetic,
+        )
+        if self._hoist_steps:
+            rate = reached
+        return HoistReport(
+            rate,
+            (reached - rate) / self._period,
+            length + 0.25 * self._period * (rate + reached),
+        )

@@ -1,0 +1,346 @@
+"""Plant: the crane in MuJoCo, with named access to its quantities.
+
+Equations of motion, with trolley position s, sway theta, reach l (sheave to payload), unstretched
+cable length l_0 (the drum) and drive setpoint s_d:
+
+    cable     T = max(0, k (l - l_0) + c (l' - l_0')),  k = K_l / l_0,  c = C_l / l_0
+    drive     F = m_c [w (s_d' - s') + (w^2 / 4) (s_d - s)],  w the drive bandwidth
+    trolley   m_c s'' = F - C_c s' + T sin(theta) + (C_1 theta' / l) cos(theta)
+    payload   a point mass m under gravity, the tension T along the cable and the torque
+              -C_1 theta' about the sheave
+    setpoint  s_d'' = the action, within speed limit and limit switches
+    drum      l_0'' = the hoist's ramp towards the operator's reference, within its limit switches
+
+Setpoint and drum are kinematic: no force moves them. The trolley's drive is a velocity loop with a
+position loop around it, as the paper's cascaded loops, so that a soft drive lags without damping
+the sway. The cable's gains follow l_0 once per control period, at its middle: within a period they
+are at most 1 % off, at the shortest cable.
+"""
+
+from __future__ import annotations
+
+import math
+from importlib import resources
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from crane_env.observation import CraneState
+from crane_env.parameters import CraneParameters
+from crane_env.plant.drives import DriveReport, Drives
+from crane_env.plant.motion import Stroke
+
+
+class Coordinates(NamedTuple):
+    """Joint positions and velocities, in the order of `SETPOINT` to `DRUM`; SI units."""
+
+    position: tuple[float, float, float, float, float]
+    velocity: tuple[float, float, float, float, float]
+
+
+def build_model(parameters: CraneParameters) -> mujoco.MjModel:
+    """MuJoCo model of the crane with these parameters."""
+    path = resources.files("crane_env.plant") / "crane.xml"
+    model = mujoco.MjModel.from_xml_string(path.read_text(encoding="utf-8"))
+    model.opt.timestep = parameters.physics_step
+    model.opt.gravity[2] = -parameters.gravity
+    model.body("trolley").mass[0] = parameters.trolley_mass
+    model.body("payload").mass[0] = parameters.payload_mass
+    rail = model.tendon("rail").id
+    model.tendon_damping[rail] = parameters.trolley_friction
+    model.tendon_range[rail] = (-parameters.rail_half_length, parameters.rail_half_length)
+    model.joint("sway").damping[0] = parameters.sway_friction
+    position_loop, velocity_loop = drive_loops(parameters)
+    model.joint("drive_error").stiffness[0] = position_loop
+    model.joint("drive_error").damping[0] = velocity_loop
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def drive_loops(parameters: CraneParameters) -> tuple[float, float]:
+    """Gains of the trolley drive's position loop [N/m] and velocity loop [N s/m]."""
+    velocity_loop = parameters.trolley_mass * parameters.drive_bandwidth
+    return velocity_loop * parameters.drive_bandwidth / 4.0, velocity_loop
+
+
+def cable_gains(stiffness: Any, damping: Any, unstretched_length: Any) -> tuple[Any, Any, Any]:
+    """Bias of the actuator "cable": 0, -K_l / l_0 and -C_l / l_0; of floats or arrays."""
+    return 0.0, -stiffness / unstretched_length, -damping / unstretched_length
+
+
+def cable_pull(
+    stiffness: Any, damping: Any, reach: Any, reach_rate: Any, drum: Any, drum_rate: Any
+) -> Any:
+    """Tension of the cable [N] before it is cut off at 0, from `cable_gains`; floats or arrays."""
+    return stiffness * (drum - reach) + damping * (drum_rate - reach_rate)
+
+
+def drum_stroke(parameters: CraneParameters) -> Stroke:
+    """Unstretched lengths [m] that the hoist's limit switches allow."""
+    return Stroke.between(
+        parameters.unstretched_length(parameters.cable_length_min),
+        parameters.unstretched_length(parameters.cable_length_max),
+    )
+
+
+def place(
+    parameters: CraneParameters,
+    *,
+    trolley_position: float = 0.0,
+    trolley_velocity: float = 0.0,
+    cable_length: float | None = None,
+    sway_angle: float = 0.0,
+    sway_rate: float = 0.0,
+) -> Coordinates:
+    """Places a crane with the hoist at rest and the cable in balance.
+
+    Args:
+        parameters: the crane.
+        trolley_position: within the limit switches [m].
+        trolley_velocity: within the speed limit [m/s].
+        cable_length: sheave to payload, within the hoist limits [m]; None: the initial length.
+        sway_angle: clear of the girder [rad].
+        sway_rate: [rad/s].
+
+    Raises:
+        ValueError: a value outside its range.
+    """
+    length = parameters.cable_length_initial if cable_length is None else cable_length
+    rail = parameters.trolley_position_limit
+    speed_max = parameters.trolley_speed_max
+    ranges = {
+        "trolley_position": (trolley_position, -rail, rail, "m"),
+        "trolley_velocity": (trolley_velocity, -speed_max, speed_max, "m/s"),
+        "cable_length": (length, parameters.cable_length_min, parameters.cable_length_max, "m"),
+        "sway_angle": (sway_angle, -MAX_INITIAL_SWAY, MAX_INITIAL_SWAY, "rad"),
+        "sway_rate": (sway_rate, -MAX_INITIAL_SWAY_RATE, MAX_INITIAL_SWAY_RATE, "rad/s"),
+    }
+    for name, (value, low, high, unit) in ranges.items():
+        if not low <= value <= high:
+            raise ValueError(f"{name} must be from {low:.6g} to {high:.6g} {unit}, not {value!r}.")
+    tension = parameters.payload_mass * (
+        parameters.gravity * math.cos(sway_angle) + length * sway_rate**2
+    )
+    drum = length / (1.0 + tension / parameters.cable_stiffness)
+    return Coordinates(
+        (trolley_position, 0.0, sway_angle, length, drum),
+        (trolley_velocity, 0.0, sway_rate, 0.0, 0.0),
+    )
+
+
+class SimulationDivergedError(RuntimeError):
+    """The simulation of a control period diverged; the crane stays where it was before.
+
+    Attributes:
+        drive: what the trolley drive was asked for in that period.
+    """
+
+    def __init__(self, drive: DriveReport) -> None:
+        super().__init__("The simulation diverged; the crane stays where it was.")
+        self.drive = drive
+
+
+class Plant:
+    """One crane; advances by control periods.
+
+    Args:
+        parameters: what the crane is made of.
+    """
+
+    def __init__(self, parameters: CraneParameters) -> None:
+        self.parameters = parameters
+        self.model = build_model(parameters)
+        self.data = mujoco.MjData(self.model)
+        self._bind()
+        self.reset()
+
+    def _bind(self) -> None:
+        """Resolves names once and keeps views of the arrays that every step touches."""
+        model, data, parameters = self.model, self.data, self.parameters
+        names = ("setpoint", "drive_error", "sway", "reach", "drum")
+        order = tuple(int(model.joint(name).qposadr[0]) for name in names)
+        if order != tuple(range(len(names))):
+            raise RuntimeError(f"crane.xml must declare its joints in the order {names}.")
+        self._position, self._velocity, self._control = data.qpos, data.qvel, data.ctrl
+        cable = model.actuator("cable").id
+        self._cable_gains = model.actuator_biasprm[cable, :3]
+        self._drives = Drives(parameters, drum_stroke(parameters))
+        self._substeps = parameters.substeps
+
+    def __getstate__(self) -> dict[str, object]:
+        """Parameters and full integration state: a copy continues bit for bit."""
+        state = np.empty(mujoco.mj_stateSize(self.model, mujoco.mjtState.mjSTATE_INTEGRATION))
+        mujoco.mj_getState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+        return {"parameters": self.parameters, "state": state, "gains": self._cable_gains.copy()}
+
+    def __setstate__(self, saved: dict[str, object]) -> None:
+        """Rebuilds the model and restores the state."""
+        self.__init__(saved["parameters"])  # type: ignore[misc]
+        self._cable_gains[:] = saved["gains"]
+        signature = mujoco.mjtState.mjSTATE_INTEGRATION
+        mujoco.mj_setState(self.model, self.data, saved["state"], signature)
+        mujoco.mj_forward(self.model, self.data)
+
+    def reset(
+        self,
+        *,
+        trolley_position: float = 0.0,
+        trolley_velocity: float = 0.0,
+        cable_length: float | None = None,
+        sway_angle: float = 0.0,
+        sway_rate: float = 0.0,
+    ) -> None:
+        """Places the crane as `place` does; refused, it stays where it is.
+
+        Raises:
+            ValueError: a value outside its range.
+        """
+        position, velocity = place(
+            self.parameters,
+            trolley_position=trolley_position,
+            trolley_velocity=trolley_velocity,
+            cable_length=cable_length,
+            sway_angle=sway_angle,
+            sway_rate=sway_rate,
+        )
+        mujoco.mj_resetData(self.model, self.data)
+        self._position[:] = position
+        self._velocity[:] = velocity
+        self._set_cable_gains(position[DRUM])
+        mujoco.mj_forward(self.model, self.data)
+
+    def step(self, acceleration: float, hoist_reference: float) -> DriveReport:
+        """Advances one control period.
+
+        Args:
+            acceleration: what the trolley drive is asked for, within its limit [m/s^2].
+            hoist_reference: cable rate that the hoist ramps to, > 0 lengthens [m/s].
+
+        Raises:
+            SimulationDivergedError: the equations of motion have no usable solution; the crane
+                stays where it was.
+        """
+        position, velocity = self._position.tolist(), self._velocity.tolist()
+        setpoint, _, _, _, drum = position
+        setpoint_rate, _, _, _, drum_rate = velocity
+        data, begin = self.data, self.data.time
+        travel = self._drives.travel(setpoint, setpoint_rate, acceleration)
+        hoist_acceleration, drum_middle = 0.0, drum
+        if hoist_reference or drum_rate:  # else the hoist stays at rest, as it is most of the time
+            hoist = self._drives.hoist(drum, drum_rate, hoist_reference)
+            self._velocity[DRUM] = hoist.rate
+            hoist_acceleration, drum_middle = hoist.acceleration, hoist.middle
+        self._control[0] = travel.acceleration
+        self._control[1] = hoist_acceleration
+        self._set_cable_gains(drum_middle)
+        mujoco.mj_step(self.model, data, nstep=self._substeps)
+        if data.time <= begin:
+            # MuJoCo has counted a diverged state and gone on from the model's origin at time 0.
+            self._position[:], self._velocity[:], data.time = position, velocity, begin
+            mujoco.mj_forward(self.model, data)
+            raise SimulationDivergedError(travel)
+        return travel
+
+    def _set_cable_gains(self, unstretched_length: float) -> None:
+        parameters = self.parameters
+        _, self._cable_gains[1], self._cable_gains[2] = cable_gains(
+            parameters.cable_stiffness, parameters.cable_damping, unstretched_length
+        )
+
+    def state(self) -> CraneState:
+        """Motion of trolley, cable and payload now."""
+        setpoint, error, sway, reach, _ = self._position.tolist()
+        setpoint_rate, error_rate, sway_rate, reach_rate, _ = self._velocity.tolist()
+        return CraneState(
+            setpoint + error, setpoint_rate + error_rate, reach, reach_rate, sway, sway_rate
+        )
+
+    @property
+    def time(self) -> float:
+        """Simulated time since reset [s]."""
+        return float(self.data.time)
+
+    @property
+    def trolley_position(self) -> float:
+        """Along the girder [m]."""
+        return float(self._position[SETPOINT] + self._position[DRIVE_ERROR])
+
+    @property
+    def trolley_velocity(self) -> float:
+        """[m/s]."""
+        return float(self._velocity[SETPOINT] + self._velocity[DRIVE_ERROR])
+
+    @property
+    def setpoint_position(self) -> float:
+        """Trolley position that the drive asks for [m]."""
+        return float(self._position[SETPOINT])
+
+    @property
+    def setpoint_velocity(self) -> float:
+        """Trolley velocity that the drive asks for [m/s]."""
+        return float(self._velocity[SETPOINT])
+
+    @property
+    def sway_angle(self) -> float:
+        """From the vertical, > 0: payload ahead of the trolley [rad]."""
+        return float(self._position[SWAY])
+
+    @property
+    def sway_rate(self) -> float:
+        """[rad/s]."""
+        return float(self._velocity[SWAY])
+
+    @property
+    def cable_length(self) -> float:
+        """Sheave to payload [m]."""
+        return float(self._position[REACH])
+
+    @property
+    def cable_rate(self) -> float:
+        """Rate of the cable length, > 0 lengthens [m/s]."""
+        return float(self._velocity[REACH])
+
+    @property
+    def unstretched_length(self) -> float:
+        """Unstretched length of the cable paid out [m]."""
+        return float(self._position[DRUM])
+
+    @property
+    def hoist_rate(self) -> float:
+        """Rate of the unstretched length, > 0 pays out [m/s]."""
+        return float(self._velocity[DRUM])
+
+    @property
+    def cable_tension(self) -> float:
+        """Tension of the cable [N]; exactly 0 when slack."""
+        _, _, _, reach, drum = self._position.tolist()
+        _, _, _, reach_rate, drum_rate = self._velocity.tolist()
+        _, stiffness, damping = self._cable_gains.tolist()
+        pull: float = cable_pull(stiffness, damping, reach, reach_rate, drum, drum_rate)
+        return max(0.0, pull)
+
+    @property
+    def drive_force(self) -> float:
+        """Force of the drive on the trolley [N]."""
+        loops = self.model.joint("drive_error")
+        return -float(
+            loops.stiffness[0] * self._position[DRIVE_ERROR]
+            + loops.damping[0] * self._velocity[DRIVE_ERROR]
+        )
+
+    @property
+    def payload_position(self) -> NDArray[np.float64]:
+        """Payload in the plane: along the girder, and height above the sheave [m], shape (2,)."""
+        reach, sway = self.cable_length, self.sway_angle
+        return np.array([self.trolley_position + reach * math.sin(sway), -reach * math.cos(sway)])
+
+
+SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
+
+MAX_INITIAL_SWAY = math.radians(80.0)
+"""Widest sway that a reset may ask for [rad]; at 85 degrees the payload meets the girder."""
+
+MAX_INITIAL_SWAY_RATE = 2.0
+"""Fastest sway that a reset may ask for [rad/s]."""

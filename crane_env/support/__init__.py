@@ -1,0 +1,1 @@
+"""Support: what every room leans on and no crane is in."""

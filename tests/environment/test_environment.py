@@ -1,0 +1,369 @@
+"""The environment as a Gymnasium citizen: API, seeds, copies, refusals."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import hashlib
+import json
+import pickle
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env
+
+import crane_env
+from crane_env import ButtonEvent, Buttons, CraneParameters, Observation, StageCost
+from crane_env.environment.single import OILCraneEnv
+from crane_env.operators.base import ScheduledOperator
+from crane_env.operators.manoeuvre import RandomManoeuvre
+
+
+def make(**arguments: Any) -> gymnasium.Env[Any, Any]:
+    return gymnasium.make("OILCrane-v0", **arguments)
+
+
+def play(env: gymnasium.Env[Any, Any], seed: int, steps: int = 300) -> list[Any]:
+    """Everything that an episode with random actions shows."""
+    env.action_space.seed(seed)
+    rows: list[Any] = [env.reset(seed=seed)]
+    rows += [env.step(env.action_space.sample()) for _ in range(steps)]
+    return rows
+
+
+def digest(rows: list[Any]) -> str:
+    """Bitwise fingerprint of an episode."""
+    sha = hashlib.sha256()
+    for row in rows:
+        for part in row:
+            items = sorted(part.items()) if isinstance(part, dict) else [("", part)]
+            for name, value in items:
+                sha.update(name.encode() + np.asarray(value).tobytes())
+    return sha.hexdigest()
+
+
+def test_gymnasium_finds_nothing_to_complain_about() -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        check_env(make().unwrapped, skip_render_check=True)
+    # The action is the paper's manipulated variable in m/s^2: RescaleAction gives [-1, 1].
+    ours = [str(w.message) for w in caught if "symmetric and normalized" not in str(w.message)]
+    assert ours == []
+
+
+def test_stable_baselines_finds_only_what_the_contract_decides() -> None:
+    from stable_baselines3.common.env_checker import check_env as check_sb3
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        check_sb3(make().unwrapped, skip_render_check=True)
+    ours = [str(w.message) for w in caught if "symmetric and normalized" not in str(w.message)]
+    assert ours == []
+
+
+def test_the_module_prefix_registers_too() -> None:
+    assert gymnasium.make("crane_env:OILCrane-v0").spec is not None
+
+
+def test_the_spaces_are_those_of_the_contract() -> None:
+    env = make()
+    assert Observation._fields == (
+        "trolley_position",
+        "trolley_velocity",
+        "cable_length",
+        "cable_rate",
+        "sway_angle",
+        "sway_rate",
+        "travel_reference",
+        "hoist_reference",
+    )
+    assert env.observation_space.shape == (8,)
+    assert env.observation_space.dtype == np.float64
+    assert env.action_space == gymnasium.spaces.Box(-5.0, 5.0, (1,))
+    with pytest.raises(ValueError, match="An observation has 8 entries, not 3"):
+        Observation.of(np.zeros(3))
+
+
+def test_an_episode_is_truncated_after_25_seconds() -> None:
+    env = make(operator="table1:1")
+    env.reset(seed=0)
+    for step in range(1, 1251):
+        _, _, terminated, truncated, _ = env.step(np.zeros(1))
+        assert not terminated
+        assert truncated == (step == 1250)
+
+
+def test_equal_seeds_give_bitwise_equal_episodes_and_others_do_not() -> None:
+    first, again, other = (digest(play(make(), seed)) for seed in (1, 1, 2))
+    assert first == again
+    assert first != other
+
+
+def test_equal_seeds_give_bitwise_equal_episodes_across_processes() -> None:
+    code = (
+        "from tests.environment.test_environment import *\n"
+        "print(*(digest(play(make(operator=name), 5)) for name in ('random', 'manoeuvre')))"
+    )
+    run = [sys.executable, "-c", code]
+    root = Path(__file__).parents[2]
+    done = subprocess.run(run, capture_output=True, text=True, check=True, cwd=root)
+    here = [digest(play(make(operator=name), 5)) for name in ("random", "manoeuvre")]
+    assert done.stdout.split() == here
+
+
+def test_how_far_an_episode_was_played_does_not_change_the_next() -> None:
+    def second_episode(steps: int) -> str:
+        env = make()
+        play(env, 3, steps)
+        rows: list[Any] = [env.reset()]
+        rows += [env.step(np.zeros(1)) for _ in range(200)]
+        return digest(rows)
+
+    assert second_episode(1) == second_episode(500)
+
+
+def test_the_operator_does_not_depend_on_the_controller() -> None:
+    def references(push: float) -> list[float]:
+        env = make()
+        env.reset(seed=4)
+        return [env.step(np.array([push]))[0][6] for _ in range(1000)]
+
+    assert references(0.0) == references(0.3)
+
+
+def test_reward_terms_sum_to_the_reward_and_are_the_stage_cost() -> None:
+    cost = StageCost(sway_weight=0.7, acceleration_weight=0.3)
+    env = make(cost=cost)
+    rows = play(env, 0)
+    reference = rows[0][0][6]
+    for observation, reward, _, _, info in rows[1:]:
+        parts = [info[f"reward_{name}"] for name in ("tracking", "sway", "acceleration")]
+        assert reward == sum(parts)
+        o = Observation.of(observation)
+        terms = cost.terms(
+            float(info["payload_velocity"]),
+            reference,
+            o.cable_length,
+            o.sway_angle,
+            float(info["acceleration"]),
+        )
+        assert parts == pytest.approx([-0.02 * term for term in terms], rel=1e-12)
+        reference = o.travel_reference
+
+
+def test_no_observation_entry_is_constant_over_random_play() -> None:
+    rows = play(make(), 0, 1250)
+    observations = np.array([row[0] for row in rows])
+    assert (np.ptp(observations, axis=0) > 1e-3).all()
+
+
+@pytest.mark.parametrize("parameters", ["paper", "field"])
+def test_every_observation_lies_in_its_space(parameters: str) -> None:
+    env = make(parameters=parameters)
+    for seed in range(4):
+        for row in play(env, seed, 600):
+            assert env.observation_space.contains(row[0])
+
+
+def test_the_hoist_follows_the_operator_and_not_the_action() -> None:
+    press = [ButtonEvent(0.0, Buttons(up=True)), ButtonEvent(2.0, Buttons())]
+    lengths = []
+    for push in (0.0, 2.0):
+        env = make(operator=press)
+        env.reset(seed=0)
+        for _ in range(200):
+            env.step(np.array([push]))
+        lengths.append(env.unwrapped.plant.unstretched_length)
+    assert lengths[0] == lengths[1]
+    # 2 s at 1 m/s; ramping up costs as much travel as ramping down adds.
+    assert lengths[0] == pytest.approx(8.0 - 2.0, abs=0.03)
+
+
+def test_references_follow_the_buttons_by_equations_4_and_5() -> None:
+    parameters = CraneParameters(travel_speed=0.8, hoist_speed=0.5)
+    pressed = {
+        Buttons(forward=True): (0.8, 0.0),
+        Buttons(backward=True, up=True): (-0.8, -0.5),
+        Buttons(down=True): (0.0, 0.5),
+        Buttons(forward=True, backward=True, up=True, down=True): (0.0, 0.0),
+    }
+    for buttons, references in pressed.items():
+        env = make(operator=[ButtonEvent(0.0, buttons)], parameters=parameters)
+        observation, info = env.reset(seed=0)
+        assert tuple(observation[6:]) == references
+        assert info["buttons"] == buttons
+
+
+@pytest.mark.parametrize(
+    "bad", [np.zeros(2), np.zeros((1, 1)), 0.0, np.array([np.nan]), np.array([np.inf])]
+)
+def test_a_poisoned_action_is_refused_and_the_state_stays(bad: Any) -> None:
+    env = make()
+    env.reset(seed=0)
+    env.step(np.array([0.5]))
+    twin = copy.deepcopy(env)
+    with pytest.raises(ValueError, match=r"An action (has shape|must be a finite)"):
+        env.unwrapped.step(bad)
+    after = [env.step(np.array([0.1])) for _ in range(20)]
+    assert digest(after) == digest([twin.step(np.array([0.1])) for _ in range(20)])
+
+
+def test_an_action_beyond_the_limits_is_clipped_and_reported() -> None:
+    env, twin = make(), make()
+    env.reset(seed=0)
+    twin.reset(seed=0)
+    observation, _, _, _, info = env.step(np.array([9.0]))
+    expected, _, _, _, unclipped = twin.step(np.array([5.0]))
+    assert info["action_clipped"]
+    assert not unclipped["action_clipped"]
+    assert info["acceleration"] == 5.0
+    assert observation.tolist() == expected.tolist()
+
+
+def test_the_speed_limit_and_the_limit_switch_are_reported() -> None:
+    env = make(operator=[])
+    env.reset(seed=0, options={"trolley_position": 19.0, "trolley_velocity": 1.0})
+    limited = [env.step(np.array([1.0]))[4]["drive_limited"] for _ in range(100)]
+    assert limited[-1]
+    assert env.unwrapped.plant.trolley_position < 20.0
+
+
+def test_reset_options_place_the_crane_for_one_episode() -> None:
+    env = make(operator="table1:1")
+    options = {
+        "cable_length": 4.0,
+        "sway_angle": 0.1,
+        "sway_rate": -0.2,
+        "trolley_position": 3.0,
+        "trolley_velocity": 0.5,
+        "operator": [ButtonEvent(0.0, Buttons(backward=True))],
+    }
+    observation, _ = env.reset(seed=0, options=options)
+    assert observation.tolist() == [3.0, 0.5, 4.0, 0.0, 0.1, -0.2, -1.0, 0.0]
+    observation, _ = env.reset(seed=0)
+    assert observation.tolist() == [0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"length": 4.0}, "Unknown reset option 'length'; valid: cable_length"),
+        ({"cable_length": 40.0}, "cable_length must be from 1 to 12 m, not 40.0"),
+        ({"operator": "nobody"}, "nobody"),
+    ],
+)
+def test_wrong_reset_options_are_refused_and_the_state_stays(
+    options: dict[str, Any], sentence: str
+) -> None:
+    env = make()
+    env.reset(seed=0)
+    twin = copy.deepcopy(env)
+    with pytest.raises(ValueError, match=sentence):
+        env.reset(options=options)
+    assert digest([env.step(np.zeros(1))]) == digest([twin.step(np.zeros(1))])
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])
+@pytest.mark.parametrize("operator", ["random", "manoeuvre", "table1:2"])
+def test_a_copy_in_mid_episode_continues_bit_for_bit(duplicate: Any, operator: str) -> None:
+    env = make(operator=operator)
+    play(env, 7, 150)
+    twin = duplicate(env)
+    actions = np.random.default_rng(0).uniform(-1, 1, (600, 1))
+    assert digest([env.step(a) for a in actions]) == digest([twin.step(a) for a in actions])
+    assert digest([env.reset()]) == digest([twin.reset()])
+
+
+ARGUMENTS: dict[str, Any] = {
+    "operator": RandomManoeuvre(),
+    "parameters": CraneParameters(payload_mass=150.0),
+    "cost": StageCost(sway_weight=2.0),
+    "render_mode": "rgb_array",
+    "render_width": 320,
+    "render_height": 240,
+}
+
+
+def arguments_of(env: OILCraneEnv) -> dict[str, Any]:
+    operator = env._default_operator
+    assert isinstance(operator, ScheduledOperator)
+    return {
+        "operator": operator.program,
+        "parameters": env.parameters,
+        "cost": env.cost,
+        "render_mode": env.render_mode,
+        "render_width": env.render_width,
+        "render_height": env.render_height,
+    }
+
+
+def test_copies_and_the_json_of_the_spec_keep_every_argument() -> None:
+    constructor = OILCraneEnv.__init__.__kwdefaults__
+    assert set(constructor) == set(ARGUMENTS), "an argument is missing from this test"
+    env = make(**ARGUMENTS)
+    assert env.spec is not None
+    from_json = gymnasium.make(EnvSpec.from_json(env.spec.to_json()))
+    twins = [env, copy.deepcopy(env), pickle.loads(pickle.dumps(env)), from_json]
+    for twin in twins:
+        assert arguments_of(twin.unwrapped) == ARGUMENTS
+    assert len({digest(play(twin, 0, 100)) for twin in twins}) == 1
+
+
+def test_mappings_of_json_are_arguments_too() -> None:
+    env = make(
+        parameters=json.loads(json.dumps(dataclasses.asdict(ARGUMENTS["parameters"]))),
+        cost={"sway_weight": 2.0},
+        operator=json.loads(json.dumps(dataclasses.asdict(ARGUMENTS["operator"]))),
+        render_mode="rgb_array",
+        render_width=320,
+        render_height=240,
+    )
+    assert arguments_of(env.unwrapped) == ARGUMENTS
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"operator": "nobody"}, "nobody.*valid.*random.*manoeuvre.*table1.*script"),
+        ({"parameters": {"payload_mass": -5.0}}, "payload_mass must be a positive"),
+        ({"cost": {"sway_weight": -5.0}}, "sway_weight must be zero or a positive"),
+        ({"render_mode": "ascii"}, "Unknown render_mode 'ascii'; valid: None, human, rgb_array"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.*render_mode.*")
+def test_wrong_arguments_are_refused_with_a_sentence(
+    arguments: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        make(**arguments)
+
+
+def test_a_diverged_simulation_truncates_the_episode_and_says_so() -> None:
+    env = make()
+    env.reset(seed=0)
+    env.step(np.array([1.0]))
+    env.unwrapped.plant.data.qvel[2] = 1e30
+    observation, _, terminated, truncated, info = env.step(np.array([1.0]))
+    assert (terminated, truncated, info["simulation_failed"]) == (False, True, True)
+    assert observation[5] == 1e30
+    assert np.isfinite(env.reset()[0]).all()
+
+
+def test_a_gymnasium_wrapper_rescales_the_action_for_a_learner() -> None:
+    env = gymnasium.wrappers.RescaleAction(make(), np.float32(-1.0), np.float32(1.0))
+    env.reset(seed=0)
+    info = env.step(np.array([0.5]))[4]
+    assert info["acceleration"] == pytest.approx(2.5, rel=1e-6)
+
+
+def test_a_crane_field_preset_plays() -> None:
+    rows = play(make(parameters="field"), 0, 500)
+    assert np.isfinite([row[0] for row in rows]).all()
+    assert crane_env.CraneParameters.field().acceleration_max == 0.3

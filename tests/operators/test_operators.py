@@ -1,0 +1,211 @@
+"""The registry of operators, and when a button event counts."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import json
+import pickle
+from decimal import ROUND_CEILING, Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crane_env.observation import CraneState
+from crane_env.operators.base import RELEASED, ButtonEvent, Buttons, ScheduledOperator
+from crane_env.operators.manoeuvre import RandomManoeuvre
+from crane_env.operators.registry import make_operator
+from crane_env.operators.script import ButtonScript, write_script
+from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
+from crane_env.operators.table1 import Table1Manoeuvre
+from crane_env.parameters import CraneParameters
+from tests.mpc.nominal_crane import at_rest
+
+PAPER = CraneParameters.paper()
+PRESSED = Buttons(forward=True)
+VALID = "random, manoeuvre, table1:1 … table1:10, script:FILE"
+
+PROGRAMS = [
+    RandomButtons(),
+    RandomButtons(hoist=ButtonHabits(pause_median=7.0), travel=ButtonHabits(slip_min=0.1)),
+    RandomManoeuvre(),
+    RandomManoeuvre(backward_probability=0.5, travel_press_max=5.0),
+    Table1Manoeuvre(1),
+    Table1Manoeuvre(10),
+    ButtonScript(()),
+    ButtonScript((ButtonEvent(1.5, PRESSED), ButtonEvent(2.0, RELEASED)), "script:gone.csv"),
+]
+
+
+def program_of(spec: Any) -> Any:
+    operator = make_operator(spec)
+    assert isinstance(operator, ScheduledOperator)
+    return operator.program
+
+
+@pytest.mark.parametrize(
+    ("name", "program"),
+    [
+        ("random", RandomButtons()),
+        ("manoeuvre", RandomManoeuvre()),
+        *((f"table1:{number}", Table1Manoeuvre(number)) for number in range(1, 11)),
+    ],
+)
+def test_a_name_makes_its_program(name: str, program: Any) -> None:
+    assert program_of(name) == program
+    assert program.name == name
+
+
+@pytest.mark.parametrize("ending", ["csv", "json"])
+def test_a_script_is_named_by_its_file(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"lift.{ending}"
+    schedule = (ButtonEvent(1.0, Buttons(up=True)), ButtonEvent(3.0, RELEASED))
+    write_script(path, schedule)
+    program = program_of(f"script:{path}")
+    assert program == ButtonScript(schedule, f"script:{path}")
+    path.unlink()
+    assert program_of(dataclasses.asdict(program)) == program
+
+
+@pytest.mark.parametrize("program", PROGRAMS, ids=lambda program: program.name)
+def test_a_program_comes_back_from_its_mapping_and_from_json(program: Any) -> None:
+    mapping = dataclasses.asdict(program)
+    assert mapping["name"] == program.name
+    assert program_of(mapping) == program
+    assert program_of(json.loads(json.dumps(mapping))) == program
+
+
+@pytest.mark.parametrize("program", PROGRAMS, ids=lambda program: program.name)
+def test_an_episode_of_any_program_can_be_pickled_and_copied_half_way(program: Any) -> None:
+    start = at_rest(PAPER)
+    operator = make_operator(program)
+    operator.reset(np.random.default_rng(3), start, PAPER)
+    for k in range(300):
+        operator.press(0.02 * k, start)
+    twins = [pickle.loads(pickle.dumps(operator)), copy.deepcopy(operator)]
+    rest = [operator.press(0.02 * k, start) for k in range(300, 1250)]
+    for twin in twins:
+        assert [twin.press(0.02 * k, start) for k in range(300, 1250)] == rest
+
+
+def test_a_mapping_may_give_some_fields_only() -> None:
+    program = program_of({"name": "random", "hoist": {"pause_median": 9}})
+    expected = dataclasses.replace(RandomButtons().hoist, pause_median=9)
+    assert program == RandomButtons(hoist=expected)
+
+
+def test_a_program_is_played_and_an_operator_used_as_it_is() -> None:
+    program = RandomManoeuvre()
+    assert program_of(program) is program
+
+    class Sleeper:
+        def reset(self, rng: Any, start: CraneState, parameters: CraneParameters) -> None: ...
+
+        def press(self, time: float, state: CraneState) -> Buttons:
+            return RELEASED
+
+    sleeper = Sleeper()
+    assert make_operator(sleeper) is sleeper
+
+
+def test_a_sequence_of_events_is_a_script() -> None:
+    events = [ButtonEvent(1.0, PRESSED), ButtonEvent(2.0, RELEASED)]
+    assert program_of(events) == ButtonScript(tuple(events))
+    assert program_of(json.loads(json.dumps(events))) == ButtonScript(tuple(events))
+    assert program_of([]) == ButtonScript(())
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("", "Random", "randomly", "random:3", "manoeuvre:1", "script", "script:"),
+        *("table1", "table1:", "table1:0", "table1:11", "table1:x", "table1:03", "table1:-1"),
+    ],
+)
+def test_an_unknown_name_lists_the_valid_ones(name: str) -> None:
+    with pytest.raises(ValueError, match="Unknown operator") as caught:
+        make_operator(name)
+    assert str(caught.value) == f"Unknown operator {name!r}; valid: {VALID}."
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ({}, "needs a 'name', one of: random, manoeuvre"),
+        ({"name": 3}, "Unknown operator 3; valid: random"),
+        ({"name": "random", "speed": 1.0}, "'random' has no field 'speed'; valid: travel, hoist"),
+        ({"name": "random", "travel": {"speed": 1.0}}, "'random, travel' has no field 'speed'"),
+        ({"name": "random", "travel": 3}, "travel must be a mapping, not 3"),
+        ({"name": "random", "hoist": {"slip_min": "x"}}, "slip_min must be a number, not 'x'"),
+        ({"name": "random", "hoist": {"slip_min": -1.0}}, "slip_min must be a positive"),
+        (
+            {"name": "manoeuvre", "lift_press_min": True},
+            "lift_press_min must be a number, not True",
+        ),
+        (
+            {"name": "table1:3", "number": 4},
+            "fields of operator 'table1:3' are those of 'table1:4'",
+        ),
+        ({"name": "script", "schedule": 5}, "a sequence of events, not 5"),
+        ([1.0, 2.0], "Button script, entry 1"),
+        (None, "An operator is a name"),
+        (3.0, "An operator is a name"),
+        (RandomButtons, "An operator is a name"),
+    ],
+)
+def test_what_is_no_operator_is_refused_with_the_reason(spec: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make_operator(spec)
+
+
+def test_a_missing_script_is_named() -> None:
+    with pytest.raises(FileNotFoundError, match=r"There is no button script 'no/such\.csv'"):
+        make_operator("script:no/such.csv")
+
+
+def first_pressed_step(time: float, period: float) -> int:
+    """The control step at which an event at `time` [s] is first seen."""
+    operator = make_operator([ButtonEvent(time, PRESSED)])
+    crane = CraneParameters(control_period=period)
+    operator.reset(np.random.default_rng(0), at_rest(crane), crane)
+    return next(k for k in range(10_000) if operator.press(k * period, at_rest(crane)) == PRESSED)
+
+
+@pytest.mark.parametrize(
+    ("time", "step"), [(0.0, 0), (0.01, 1), (0.02, 1), (0.06, 3), (1.83, 92), (1.84, 92)]
+)
+def test_an_event_counts_from_the_first_step_at_or_after_it(time: float, step: int) -> None:
+    assert first_pressed_step(time, 0.02) == step
+
+
+@given(st.integers(0, 25_000))
+def test_rounding_of_step_times_delays_no_event(milliseconds: int) -> None:
+    expected = (Decimal(milliseconds) / 20).to_integral_value(ROUND_CEILING)
+    assert first_pressed_step(milliseconds / 1000.0, 0.02) == expected
+
+
+def test_all_events_up_to_a_step_have_happened_and_the_last_one_holds() -> None:
+    operator = make_operator(
+        [
+            ButtonEvent(0.001, PRESSED),
+            ButtonEvent(0.002, Buttons(up=True)),
+            ButtonEvent(0.03, PRESSED),
+        ]
+    )
+    operator.reset(np.random.default_rng(0), at_rest(PAPER), PAPER)
+    pressed = [operator.press(0.02 * k, at_rest(PAPER)) for k in range(4)]
+    assert pressed == [RELEASED, Buttons(up=True), PRESSED, PRESSED]
+
+
+def test_a_reset_begins_anew() -> None:
+    operator = make_operator("table1:4")
+    runs = []
+    for _ in range(2):
+        operator.reset(np.random.default_rng(0), at_rest(PAPER), PAPER)
+        runs.append([operator.press(0.02 * k, at_rest(PAPER)) for k in range(1250)])
+    assert runs[0] == runs[1]
+    assert runs[0][0] == RELEASED
