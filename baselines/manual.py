@@ -21,8 +21,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import Controller, finite_observation
+from baselines.controller import finite_observation
 from baselines.mpc.settings import MpcSettings
+from crane_env.controller import Controller
 from crane_env.parameters import CraneParameters
 
 

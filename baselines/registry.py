@@ -6,8 +6,8 @@ import importlib
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.controller import Controller
 from baselines.mpc.settings import MpcSettings
+from crane_env.controller import Controller
 from crane_env.parameters import CraneParameters
 
 CONTROLLERS: dict[str, str] = {

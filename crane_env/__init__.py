@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import gymnasium
 
+from crane_env.controller import Controller
 from crane_env.episode.metrics import Metrics
-from crane_env.episode.play import Controller, Trajectory, run_episode
+from crane_env.episode.play import run_episode
+from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import CraneState, Observation
 from crane_env.operators.base import ButtonEvent, Buttons, Operator
 from crane_env.operators.manoeuvre import RandomManoeuvre

@@ -157,7 +157,7 @@ class CraneParameters:
             cls,
             value,
             must_be="Crane parameters must be CraneParameters, a mapping or a preset's name",
-            unknown="Unknown crane parameter",
+            unknown="crane parameter",
         )
 
     @property

@@ -69,7 +69,7 @@ class StageCost:
             cls,
             value,
             must_be="A stage cost must be a StageCost or a mapping",
-            unknown="Unknown stage cost field",
+            unknown="stage cost field",
         )
 
     def terms(

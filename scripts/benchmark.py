@@ -31,12 +31,13 @@ from rich.table import Table
 
 import crane_env
 from baselines import make_controller
-from baselines.controller import Controller, PredictiveController
 from baselines.evaluation.worker_pool import available_cores
+from baselines.mpc.controller import PredictiveController
 from baselines.mpc.ipopt_form import WARM_BARRIER, IpoptNmpc
 from baselines.mpc.linear import LinearMpc
 from baselines.mpc.prediction.cable import measured_cable_rate
 from baselines.mpc.settings import MpcSettings
+from crane_env.controller import Controller
 from crane_env.plant.single import build_model, place
 
 

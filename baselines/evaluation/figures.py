@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.registry import CONTROLLERS
-from crane_env.episode.play import Trajectory
+from crane_env.episode.trajectory import Trajectory
 from crane_env.support.atomic_file import atomic_file
 from crane_env.support.extras import require
 

@@ -26,7 +26,7 @@ from typing import Any, Literal
 
 from baselines.evaluation.episode_spec import EpisodeSpec
 from crane_env.episode.metrics import Metrics
-from crane_env.episode.play import Trajectory
+from crane_env.episode.trajectory import Trajectory
 from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file
 from crane_env.support.extras import require
 

@@ -25,7 +25,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import Plan, PredictiveController
+from baselines.mpc.controller import Plan, PredictiveController
 from baselines.mpc.prediction.cable import assumed_length
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation

@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import Plan, PredictiveController
+from baselines.mpc.controller import Plan, PredictiveController
 from baselines.mpc.prediction.cable import assumed_length
 from baselines.mpc.prediction.equation1 import sway_step
 from baselines.mpc.prediction.symbolic import numpy_on_symbols

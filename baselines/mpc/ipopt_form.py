@@ -18,9 +18,10 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import Plan, PredictiveController
+from baselines.mpc.controller import Plan, PredictiveController
 from baselines.mpc.prediction.cable import CableRate, measured_cable_rate, null_cable_rate
-from baselines.mpc.prediction.symbolic import Horizon, NonlinearPrediction, Start
+from baselines.mpc.prediction.problem import Horizon, Start
+from baselines.mpc.prediction.symbolic import NonlinearPrediction
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters

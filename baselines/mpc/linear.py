@@ -21,7 +21,7 @@ from typing import NamedTuple, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import Plan, PredictiveController
+from baselines.mpc.controller import Plan, PredictiveController
 from baselines.mpc.prediction.cable import assumed_length
 from baselines.mpc.prediction.constant_length import PendulumPrediction
 from baselines.mpc.quadratic_program import QuadraticProgram

@@ -28,11 +28,11 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import Plan, PredictiveController
+from baselines.mpc.controller import Plan, PredictiveController
 from baselines.mpc.limits import TrolleyLimits
 from baselines.mpc.prediction.cable import CableRate, measured_cable_rate, null_cable_rate
 from baselines.mpc.prediction.compiled import compiled_residuals_and_jacobian
-from baselines.mpc.prediction.symbolic import Horizon, Start
+from baselines.mpc.prediction.problem import Horizon, Start
 from baselines.mpc.quadratic_program import QuadraticProgram
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation

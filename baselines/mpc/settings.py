@@ -73,7 +73,7 @@ class MpcSettings:
             cls,
             value,
             must_be="MPC settings must be MpcSettings or a mapping",
-            unknown="Unknown MPC setting",
+            unknown="MPC setting",
         )
 
     def acceleration_range(self, crane: CraneParameters) -> tuple[float, float]:

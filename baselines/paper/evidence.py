@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from baselines.evaluation.episode_spec import Setup
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.paper.oscillation import Oscillation, short_cable_oscillation
-from crane_env.operators.press import Press, press_events
+from crane_env.operators.base import Press, press_events
 from crane_env.operators.script import ButtonScript
 from crane_env.operators.table1 import TABLE_1
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from crane_env.episode.play import Trajectory
+from crane_env.episode.trajectory import Trajectory
 
 SHORT_BAND = 0.05
 """The cable counts as short within this distance of the shortest length of the episode [m]."""

@@ -21,9 +21,10 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.controller import Controller, finite_observation
+from baselines.controller import finite_observation
 from baselines.mpc.limits import TrolleyLimits
 from baselines.mpc.settings import MpcSettings
+from crane_env.controller import Controller
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from crane_env.support.extras import require

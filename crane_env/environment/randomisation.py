@@ -69,7 +69,7 @@ class Randomisation:
             cls,
             value,
             must_be="A randomisation must be a Randomisation or a mapping",
-            unknown="Unknown randomisation field",
+            unknown="randomisation field",
         )
 
     @property

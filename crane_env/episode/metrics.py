@@ -17,13 +17,9 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from crane_env.episode.play import Trajectory
 
 SETTLING_BAND = 0.05
 """Payload position counts as settled within this distance of its final value [m]."""
@@ -118,41 +114,3 @@ def after_release(
         float(travelled.max() - travelled[-1]),
         settled * control_period,
     )
-
-
-def measure(trajectory: Trajectory) -> Metrics:
-    """All indices of an episode."""
-    parameters = trajectory.parameters
-    period = parameters.control_period
-    drift, overshoot, settling = after_release(
-        trajectory.travel_reference, trajectory.payload_position, period
-    )
-    last_period = parameters.sway_period(float(trajectory.cable_length[-1]))
-    last_samples = max(1, round(last_period / period))
-    too_fast = np.abs(trajectory.trolley_velocity) > parameters.trolley_speed_max + SPEED_TOLERANCE
-    violations = trajectory.action_clipped | trajectory.drive_limited | too_fast
-    act_time = trajectory.act_time
-    return Metrics(
-        IAE=integral_absolute_error(
-            trajectory.travel_reference, trajectory.payload_velocity, period
-        ),
-        release_drift=drift,
-        rest_overshoot=overshoot,
-        settling_time=settling,
-        max_sway=float(np.abs(trajectory.sway_angle).max()),
-        residual_sway=float(np.abs(trajectory.sway_angle[-last_samples:]).max()),
-        peak_acceleration=float(np.abs(trajectory.acceleration).max()),
-        rms_acceleration=float(np.sqrt(np.mean(trajectory.acceleration**2))),
-        slack_time=float(np.count_nonzero(trajectory.cable_tension == 0.0) * period),
-        limit_violations=int(np.count_nonzero(violations)),
-        stage_cost=-float(trajectory.reward.sum()),
-        act_median=float(np.median(act_time)),
-        act_p99=float(np.percentile(act_time, 99)),
-        act_max=float(act_time.max()),
-        act_late=float(np.mean(act_time > period)),
-        solver_failures=trajectory.solver_failures,
-    )
-
-
-SPEED_TOLERANCE = 0.02
-"""The trolley may exceed its setpoint by this much while its drive settles [m/s]."""

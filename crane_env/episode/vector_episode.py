@@ -10,7 +10,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
 from crane_env.environment.vector import OILCraneVectorEnv
-from crane_env.episode.play import EARNED_AFTER, SEEN_BEFORE, Trajectory
+from crane_env.episode.play import EARNED_AFTER, SEEN_BEFORE
+from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import Observation
 
 

@@ -29,9 +29,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crane_env.observation import CraneState
-from crane_env.operators.base import ButtonEvent
+from crane_env.operators.base import ButtonEvent, Press, press_events
 from crane_env.operators.dead_reckoning import hoist_axis, trolley_axis
-from crane_env.operators.press import Press, press_events
 from crane_env.operators.table1 import HOIST_PRESS_DURATION, ManoeuvreTimes
 from crane_env.parameters import CraneParameters
 

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crane_env.observation import CraneState
-from crane_env.operators.base import ButtonEvent
-from crane_env.operators.press import Press, press_events
+from crane_env.operators.base import ButtonEvent, Press, press_events
 from crane_env.parameters import CraneParameters
 
 HOIST_PRESS_DURATION = 4.0

@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
+from crane_env.support.checks import choice
+
 T = TypeVar("T")
 
 
@@ -16,7 +18,7 @@ def from_fields(cls: type[T], value: Any, *, must_be: str, unknown: str) -> T:
         cls: the dataclass.
         value: what was given.
         must_be: how the error on anything else begins, up to its type.
-        unknown: how the error on a field that does not exist begins, up to its name.
+        unknown: what such a field is, as in "Unknown NAME ...".
 
     Raises:
         ValueError: something else, an unknown field, or a value that `cls` refuses.
@@ -27,7 +29,7 @@ def from_fields(cls: type[T], value: Any, *, must_be: str, unknown: str) -> T:
         return value
     if not isinstance(value, Mapping):
         raise ValueError(f"{must_be}, not {type(value).__name__}.")
-    names = [field.name for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
-    for name in sorted(set(value) - set(names)):
-        raise ValueError(f"{unknown} {name!r}; valid: {', '.join(names)}.")
+    names = [field.name for field in dataclasses.fields(cls) if field.init]  # type: ignore[arg-type]
+    for name in value:
+        choice(unknown, name, names)
     return cls(**value)

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from crane_env.episode.metrics import after_release, integral_absolute_error, release_step
-from crane_env.episode.play import Trajectory
+from crane_env.episode.trajectory import Trajectory
 from crane_env.parameters import CraneParameters
 
 PERIOD = 0.02

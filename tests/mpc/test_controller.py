@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.controller import Plan, PredictiveController, SolverStatistics, finite_observation
+from baselines.controller import finite_observation
+from baselines.mpc.controller import Plan, PredictiveController, SolverStatistics
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters

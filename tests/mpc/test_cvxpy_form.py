@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines import make_controller
-from baselines.controller import PredictiveController
+from baselines.mpc.controller import PredictiveController
 from baselines.mpc.cvxpy_form import adaptive_cvxpy
 from baselines.mpc.limits import TrolleyLimits
 from baselines.mpc.linear import adaptive_cost

@@ -10,7 +10,7 @@ from baselines.mpc import ipopt_form
 from baselines.mpc.ipopt_form import nmpc_a_ipopt, nmpc_b_ipopt
 from baselines.mpc.limits import TrolleyLimits
 from baselines.mpc.prediction.cable import measured_cable_rate
-from baselines.mpc.prediction.symbolic import Horizon, Start
+from baselines.mpc.prediction.problem import Horizon, Start
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters

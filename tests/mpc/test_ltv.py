@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import crane_env
-from baselines.controller import Controller
 from baselines.mpc.linear import adaptive
 from baselines.mpc.ltv import ltv, time_varying_cost
 from baselines.mpc.nonlinear import nmpc_b
 from baselines.mpc.settings import MpcSettings
+from crane_env.controller import Controller
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from tests.mpc.prediction.linear_crane import act, mirrored, observations, random_observation

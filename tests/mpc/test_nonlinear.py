@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from baselines.controller import Plan
 from baselines.mpc import nonlinear
+from baselines.mpc.controller import Plan
 from baselines.mpc.ipopt_form import IpoptNmpc, nmpc_b_ipopt
 from baselines.mpc.linear import adaptive
 from baselines.mpc.nonlinear import (
@@ -27,7 +27,8 @@ from baselines.mpc.nonlinear import (
 )
 from baselines.mpc.prediction.cable import measured_cable_rate
 from baselines.mpc.prediction.equation1 import sway_step
-from baselines.mpc.prediction.symbolic import NonlinearPrediction, Start
+from baselines.mpc.prediction.problem import Start
+from baselines.mpc.prediction.symbolic import NonlinearPrediction
 from baselines.mpc.quadratic_program import QpSolution, QuadraticProgram
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation

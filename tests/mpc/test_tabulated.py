@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import crane_env
-from baselines.controller import Controller
 from baselines.mpc.cost_table import INTERPOLATIONS, NODES_MIN, Axis, measured, square_root
 from baselines.mpc.linear import CostModel, LinearMpc, adaptive, adaptive_cost
 from baselines.mpc.ltv import ltv, time_varying_cost
@@ -29,6 +28,7 @@ from baselines.mpc.tabulated import (
     tabulated,
     tabulated_ltv,
 )
+from crane_env.controller import Controller
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from scripts.table_memory import (

@@ -5,8 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crane_env.operators.base import RELEASED, ButtonEvent, Buttons
-from crane_env.operators.press import Press, press_events
+from crane_env.operators.base import RELEASED, ButtonEvent, Buttons, Press, press_events
 
 presses = st.builds(
     Press,

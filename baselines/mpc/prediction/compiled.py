@@ -30,7 +30,7 @@ from baselines.mpc.prediction.equation1 import (
     tangential_gradient,
 )
 from baselines.mpc.prediction.machine_code import machine_code
-from baselines.mpc.prediction.symbolic import Horizon, Start
+from baselines.mpc.prediction.problem import Horizon, Start
 
 _Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from baselines.mpc.prediction.symbolic import Horizon, Start
+from baselines.mpc.prediction.problem import Horizon, Start
 from crane_env.support.extras import require
 
 _First = TypeVar("_First")

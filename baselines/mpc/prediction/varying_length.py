@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from baselines.mpc.prediction.cable import cable_intervals, hoist_stop_time, measured_cable_rate
 from baselines.mpc.prediction.machine_code import machine_code
-from baselines.mpc.prediction.symbolic import Horizon, Start
+from baselines.mpc.prediction.problem import Horizon, Start
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters

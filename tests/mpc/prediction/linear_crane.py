@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from baselines.controller import Controller
 from baselines.mpc.settings import MpcSettings
+from crane_env.controller import Controller
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 

@@ -15,7 +15,8 @@ from baselines.mpc.prediction.compiled import (
     compiled_residuals_and_jacobian,
     residuals_and_jacobian,
 )
-from baselines.mpc.prediction.symbolic import Horizon, NonlinearPrediction, Start
+from baselines.mpc.prediction.problem import Horizon, Start
+from baselines.mpc.prediction.symbolic import NonlinearPrediction
 from baselines.mpc.settings import MpcSettings
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost

@@ -12,7 +12,7 @@ import numba
 import pytest
 
 from baselines.mpc.prediction.machine_code import machine_code
-from baselines.mpc.prediction.symbolic import Horizon, Start
+from baselines.mpc.prediction.problem import Horizon, Start
 from baselines.mpc.settings import MpcSettings
 from crane_env.parameters import CraneParameters
 

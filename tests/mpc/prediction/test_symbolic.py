@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from baselines.mpc.prediction.cable import measured_cable_rate, null_cable_rate
-from baselines.mpc.prediction.symbolic import Horizon, NonlinearPrediction, Start
+from baselines.mpc.prediction.problem import Horizon, Start
+from baselines.mpc.prediction.symbolic import NonlinearPrediction
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters

@@ -15,7 +15,7 @@ from scipy.special import j0, j1, y0, y1
 from baselines.mpc.prediction.cable import hoist_stop_time, measured_cable_rate
 from baselines.mpc.prediction.compiled import compiled_residuals_and_jacobian
 from baselines.mpc.prediction.constant_length import PendulumPrediction
-from baselines.mpc.prediction.symbolic import Horizon, Start
+from baselines.mpc.prediction.problem import Horizon, Start
 from baselines.mpc.prediction.varying_length import TimeVaryingPrediction, free_map, responses
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation

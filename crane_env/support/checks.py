@@ -1,0 +1,133 @@
+"""Checks: what counts as a number and what range it must keep, one answer for every entry point.
+
+A number is a `numbers.Real`, a whole number a `numbers.Integral`: NumPy's scalars are, booleans,
+strings and arrays are not. Whatever is refused is refused with a ValueError of one sentence that
+names the value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+import reprlib
+from collections.abc import Callable, Iterable
+from numbers import Integral, Real
+
+import numpy as np
+
+SEED_LIMIT = 2**63
+"""Seeds are below this, so that they fit into the 64-bit columns of the results."""
+
+
+def shown(value: object) -> str:
+    """A value as an error message shows it: its repr, cut where it would fill the screen."""
+    try:
+        return _shortener.repr(value)
+    except Exception:  # a repr that fails must not hide the error that it was to be part of
+        return f"an object of type {type(value).__name__}"
+
+
+def real(name: str, value: object, must_be: str = "a finite number") -> float:
+    """A finite number.
+
+    Args:
+        name: what the number is, for the error.
+        value: what was given.
+        must_be: what is allowed, for the error.
+
+    Raises:
+        ValueError: it is no number, or not finite.
+    """
+    number = math.nan
+    if isinstance(value, Real) and not isinstance(value, (bool, np.bool_)):
+        try:
+            number = float(value)
+        except (OverflowError, ValueError):  # more digits than a float has room for
+            number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"{name} must be {must_be}, not {shown(value)}.")
+    return number
+
+
+def positive(name: str, value: object) -> float:
+    """A finite number above 0.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    return _where(name, value, "a positive finite number", lambda number: number > 0.0)
+
+
+def not_negative(name: str, value: object) -> float:
+    """A finite number of at least 0.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    return _where(name, value, "zero or a positive finite number", lambda number: number >= 0.0)
+
+
+def within(name: str, value: object, low: float, high: float, unit: str = "") -> float:
+    """A number from `low` to `high`, both included.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    allowed = f"from {low:.6g} to {high:.6g} {unit}".rstrip()
+    return _where(name, value, allowed, lambda number: low <= number <= high)
+
+
+def whole(name: str, value: object, least: int = 0, below: int | None = None) -> int:
+    """A whole number.
+
+    Args:
+        name: what the number is, for the error.
+        value: what was given.
+        least: smallest that is allowed.
+        below: all that are allowed are below this; None: there is no such bound.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    if isinstance(value, Integral) and not isinstance(value, (bool, np.bool_)):
+        number = int(value)
+        if number >= least and (below is None or number < below):
+            return number
+    allowed = f"of at least {least}" + ("" if below is None else f" and below {below}")
+    raise ValueError(f"{name} must be a whole number {allowed}, not {shown(value)}.")
+
+
+def seed(value: object, name: str = "A seed") -> int:
+    """A seed of an episode: a whole number from 0 to before `SEED_LIMIT`.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    return whole(name, value, 0, SEED_LIMIT)
+
+
+def choice(name: str, value: object, valid: Iterable[str]) -> str:
+    """One of some names.
+
+    Args:
+        name: what the names are of, as in "Unknown NAME ...".
+        value: what was given.
+        valid: the names.
+
+    Raises:
+        ValueError: it is something else; the message lists the names.
+    """
+    names = tuple(valid)
+    if isinstance(value, str) and value in names:
+        return value
+    raise ValueError(f"Unknown {name} {shown(value)}; valid: {', '.join(names)}.")
+
+
+def _where(name: str, value: object, allowed: str, holds: Callable[[float], bool]) -> float:
+    number = real(name, value, allowed)
+    if not holds(number):
+        raise ValueError(f"{name} must be {allowed}, not {shown(value)}.")
+    return number
+
+
+_shortener = reprlib.Repr()
+_shortener.maxstring = _shortener.maxother = _shortener.maxlong = 80
