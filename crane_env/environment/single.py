@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -12,7 +12,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from crane_env.kinematics import payload_position, payload_velocity
-from crane_env.observation import CraneState, observation_space
+from crane_env.observation import CraneState, Observation, observation_space
 from crane_env.operators.base import Buttons
 from crane_env.operators.registry import OperatorSpec, make_operator
 from crane_env.parameters import CraneParameters
@@ -27,6 +27,24 @@ RESET_STATE = ("cable_length", "sway_angle", "sway_rate", "trolley_position", "t
 
 ACTION_ROUNDING = 1e-6
 """Share of the limit by which an action may exceed it by rounding to float32."""
+
+
+class StepRecord(NamedTuple):
+    """The plant's own truth after one control period or a reset, which no wrapper has touched.
+
+    Attributes:
+        time: since the reset [s].
+        observation: state of the plant and the references now in force.
+        info: as `reset` or `step` returns it; a copy.
+        action: trolley acceleration that was asked for [m/s^2], before any clipping; nan at reset.
+        reward: [m^2/s]; 0 at reset.
+    """
+
+    time: float
+    observation: Observation
+    info: dict[str, Any]
+    action: float
+    reward: float
 
 
 class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
@@ -96,6 +114,13 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     simulation ever diverge, the crane stays where it was, the episode is truncated and `info` has
     `simulation_failed`.
 
+    ## Truth behind wrappers
+
+    Wrappers may repeat actions, delay or distort what is observed. `env.unwrapped.truth()` and
+    `env.unwrapped.time` are the plant's own, and `env.unwrapped.recorder`, a function or None, is
+    called with a `StepRecord` at the end of every `reset` and `step` of the plant. Copies and
+    pickles have no recorder.
+
     Args:
         operator: who presses the buttons: "random", "manoeuvre", "table1:3", "script:FILE", a
             program, a list of `ButtonEvent`s or an operator object.
@@ -145,6 +170,16 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         self._step_index = 0
         self._show(Buttons())
         self._renderer: CraneRenderer | None = None
+        self.recorder: Callable[[StepRecord], None] | None = None
+
+    @property
+    def time(self) -> float:
+        """Time since the reset [s]."""
+        return self._step_index * self.parameters.control_period
+
+    def truth(self) -> Observation:
+        """State of the plant and the references now in force, whatever wraps the environment."""
+        return Observation(*self.plant.state(), self._travel_reference, self._hoist_reference)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -176,9 +211,12 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         stream = np.random.default_rng(int(self.np_random.integers(2**63)))
         self._operator.reset(stream, state, self.parameters)
         self._read_buttons(state)
+        info = self._info(state)
         if self.render_mode == "human":
             self.render()
-        return self._observation(state), self._info(state)
+        if self.recorder is not None:
+            self.recorder(StepRecord(self.time, self.truth(), dict(info), math.nan, 0.0))
+        return self._observation(state), info
 
     def step(
         self, action: NDArray[Any]
@@ -225,6 +263,8 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         if self.render_mode == "human":
             self.render()
         reward = tracking + sway + effort
+        if self.recorder is not None:
+            self.recorder(StepRecord(self.time, self.truth(), dict(info), asked, reward))
         return self._observation(state), reward, False, diverged, info
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -259,8 +299,8 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
             self._renderer = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the graphics: a copy continues bit for bit and draws for itself."""
-        return {**self.__dict__, "_renderer": None}
+        """Everything but graphics and recorder: a copy continues bit for bit, draws for itself."""
+        return {**self.__dict__, "_renderer": None, "recorder": None}
 
     def _checked(self, action: NDArray[Any]) -> float:
         array = np.asarray(action)

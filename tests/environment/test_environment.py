@@ -356,6 +356,27 @@ def test_a_diverged_simulation_truncates_the_episode_and_says_so() -> None:
     assert np.isfinite(env.reset()[0]).all()
 
 
+def test_the_recorder_sees_the_truth_at_every_control_period_behind_wrappers() -> None:
+    records: list[Any] = []
+    bare = make(operator="table1:1")
+    noisy = gymnasium.wrappers.TransformObservation(
+        gymnasium.wrappers.RepeatAction(make(operator="table1:1"), 4), lambda o: o + 1.0, None
+    )
+    noisy.unwrapped.recorder = records.append
+    twin = copy.deepcopy(noisy.unwrapped)
+    assert twin.recorder is None
+    seen = [bare.reset(seed=0)[0]]
+    noisy.reset(seed=0)
+    for k in range(100):
+        noisy.step(np.array([0.1 * k]))
+        seen += [bare.step(np.array([0.1 * k]))[0] for _ in range(4)]
+    assert [list(record.observation) for record in records] == [list(row) for row in seen]
+    assert [record.time for record in records] == pytest.approx(0.02 * np.arange(401))
+    assert [record.action for record in records[-4:]] == [0.1 * 99] * 4
+    assert noisy.unwrapped.truth() == records[-1].observation
+    assert noisy.unwrapped.time == records[-1].time
+
+
 def test_a_gymnasium_wrapper_rescales_the_action_for_a_learner() -> None:
     env = gymnasium.wrappers.RescaleAction(make(), np.float32(-1.0), np.float32(1.0))
     env.reset(seed=0)
