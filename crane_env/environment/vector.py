@@ -29,7 +29,7 @@ from crane_env.plant.single import place
 from crane_env.stage_cost import StageCost
 
 if TYPE_CHECKING:
-    from crane_env.rendering.vector_rendering import VectorRenderer
+    from crane_env.rendering.scene import VectorRenderer
 
 CraneSpec = CraneParameters | Mapping[str, Any] | str | None
 """What `CraneParameters.of` reads."""
@@ -282,7 +282,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             )
             return None
         if self._renderer is None:
-            from crane_env.rendering.vector_rendering import VectorRenderer
+            from crane_env.rendering.scene import VectorRenderer
 
             self._renderer = VectorRenderer(
                 self.plant, width=self.render_width, height=self.render_height

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
-from crane_env.plant.drives import Drives
-from crane_env.plant.motion import ARRAYS, Stroke
+from crane_env.plant.drives import ARRAYS, Drives, Stroke
 from crane_env.plant.single import (
     DRIVE_ERROR,
     DRUM,

@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
-from crane_env.plant.drives import DriveReport, Drives
-from crane_env.plant.motion import Stroke
+from crane_env.plant.drives import DriveReport, Drives, Stroke
 
 
 class Coordinates(NamedTuple):

@@ -1,4 +1,4 @@
-"""Rendering: the crane in its hall with the operator's instruments, as a picture or in a window."""
+"""Rendering: cranes in their halls with the operators' instruments, in pictures or in a window."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from crane_env.kinematics import payload_position, payload_velocity
 from crane_env.observation import CraneState
 from crane_env.operators.base import Buttons
+from crane_env.plant.batch import VectorPlant
 from crane_env.plant.single import Plant
 from crane_env.rendering.canvas import SMALLEST_PICTURE, Canvas, PixelCanvas, WindowCanvas
 from crane_env.rendering.hall import MARKS_REACH, Solid, floor_depth, hall, marks, shadows
@@ -35,6 +36,9 @@ ARROW_SCALE = 1.5
 
 SLOWEST_ARROW = 0.02
 """Velocity below which no arrow is drawn [m/s]."""
+
+UPRIGHT = np.eye(3).ravel()
+"""Orientation of what is not turned."""
 
 
 class CraneRenderer:
@@ -187,4 +191,48 @@ class CraneRenderer:
         return geom
 
 
-UPRIGHT = np.eye(3).ravel()
+class VectorRenderer:
+    """Draws many cranes; what it draws are copies, the cranes are only read.
+
+    Args:
+        plant: the cranes.
+        width: of a picture [pixel].
+        height: of a picture [pixel].
+
+    Raises:
+        ValueError: a picture too small for the instruments.
+        RuntimeError: no OpenGL back end; the message says what to set and install.
+    """
+
+    def __init__(self, plant: VectorPlant, *, width: int, height: int) -> None:
+        self._plant = plant
+        self._copies = [Plant(crane) for crane in plant.cranes]
+        self._renderers: list[CraneRenderer] = []
+        for twin in self._copies:
+            self._renderers.append(CraneRenderer(twin, width=width, height=height, window=False))
+
+    def draw(
+        self, buttons: NDArray[np.bool_], travel_speed: float
+    ) -> tuple[NDArray[np.uint8], ...]:
+        """Draws the cranes as they are now.
+
+        Args:
+            buttons: that each operator presses, in the order of `Buttons`, shape (N, 4).
+            travel_speed: that a travel button asks for [m/s].
+
+        Returns:
+            The pixels of each, uint8, shape (height, width, 3).
+        """
+        pictures = []
+        for index, (twin, renderer) in enumerate(zip(self._copies, self._renderers, strict=True)):
+            self._plant.copy_to(index, twin)
+            pressed = Buttons(*buttons[index].tolist())
+            picture = renderer.draw(pressed, pressed.travel * travel_speed)
+            assert picture is not None, "a renderer without a window returns its pixels"
+            pictures.append(picture)
+        return tuple(pictures)
+
+    def close(self) -> None:
+        """Frees the graphics memory; can be called again."""
+        for renderer in self._renderers:
+            renderer.close()

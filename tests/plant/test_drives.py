@@ -1,4 +1,4 @@
-"""The drives: limits, and floats and arrays alike."""
+"""The drives: ramps, limits, limit switches; floats and arrays alike."""
 
 from __future__ import annotations
 
@@ -10,17 +10,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crane_env.parameters import CraneParameters
-from crane_env.plant.drives import Drives
-from crane_env.plant.motion import ARRAYS, Stroke
+from crane_env.plant.drives import ARRAYS, Drives, Stroke, next_rate, stoppable_rate
 
 PAPER = CraneParameters.paper()
 STROKE = Stroke.between(1.0, 12.0)
+RAIL = Stroke.between(-3.0, 5.0)
+PERIOD = PAPER.control_period
 
 positions = st.floats(-20.0, 20.0)
 lengths = st.floats(1.0, 12.0)
 rates = st.floats(-2.0, 2.0)
 accelerations = st.floats(-5.0, 5.0)
 ramps = st.sampled_from([0.0, 0.3])
+places = st.floats(-3.0, 5.0)
+steepnesses = st.floats(0.1, 50.0)
 
 
 def drives(ramp: float, *, many: bool) -> Drives:
@@ -84,3 +87,51 @@ def test_a_ramped_hoist_needs_its_ramp_time_and_a_stepping_one_none() -> None:
     assert periods == 15
     step = drives(0.0, many=False).hoist(5.0, 0.0, 1.0)
     assert step == (1.0, 0.0, 5.0 + 0.01)
+
+
+@given(rates, rates, places, steepnesses)
+def test_the_rate_never_changes_faster_than_the_ramp(
+    rate: float, wanted: float, position: float, acceleration: float
+) -> None:
+    new = next_rate(
+        rate, wanted, position=position, stroke=RAIL, acceleration=acceleration, period=PERIOD
+    )
+    assert abs(new - rate) <= acceleration * PERIOD * (1 + 1e-12)
+
+
+@given(st.lists(rates, min_size=300, max_size=300), steepnesses, places)
+def test_no_sequence_of_wishes_leaves_the_stroke(
+    wishes: list[float], acceleration: float, position: float
+) -> None:
+    rate = 0.0
+    for wanted in wishes:
+        for _ in range(5):
+            new = next_rate(
+                rate,
+                wanted,
+                position=position,
+                stroke=RAIL,
+                acceleration=acceleration,
+                period=PERIOD,
+            )
+            position += 0.5 * PERIOD * (rate + new)
+            rate = new
+            # Ramps are linear over whole periods, so the last one may stop this much later.
+            slip = acceleration * PERIOD**2 / 8
+            assert -3.0 - slip <= position <= 5.0 + slip
+
+
+@given(st.floats(0.0, 2.0), st.floats(0.0, 4.0), steepnesses)
+def test_the_stoppable_rate_solves_the_stopping_equation(
+    rate: float, gap: float, acceleration: float
+) -> None:
+    new = stoppable_rate(rate, gap, acceleration, PERIOD)
+    if new > 0:
+        stopping = (rate + new) * PERIOD / 2 + new**2 / (2 * acceleration)
+        assert stopping == pytest.approx(gap, rel=1e-6, abs=1e-6)
+    else:
+        assert rate * PERIOD / 2 >= gap - 1e-12
+
+
+def test_far_from_the_ends_the_wish_is_granted_exactly() -> None:
+    assert next_rate(0.5, 0.55, position=0.0, stroke=RAIL, acceleration=5.0, period=PERIOD) == 0.55
