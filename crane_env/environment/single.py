@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from crane_env.kinematics import payload_position, payload_velocity
 from crane_env.observation import CraneState, Observation, observation_space
-from crane_env.operators.base import Buttons
+from crane_env.operators.base import RELEASED
 from crane_env.operators.registry import OperatorSpec, make_operator
 from crane_env.parameters import CraneParameters
 from crane_env.plant.single import Plant, SimulationDivergedError
@@ -168,7 +168,8 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         self._default_operator = make_operator(operator)
         self._operator = self._default_operator
         self._step_index = 0
-        self._show(Buttons())
+        self._buttons = RELEASED
+        self._references = (0.0, 0.0)
         self._renderer: CraneRenderer | None = None
         self.recorder: Callable[[StepRecord], None] | None = None
 
@@ -179,7 +180,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
 
     def truth(self) -> Observation:
         """State of the plant and the references now in force, whatever wraps the environment."""
-        return Observation(*self.plant.state(), self._travel_reference, self._hoist_reference)
+        return Observation(*self.plant.state(), *self._references)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -232,10 +233,10 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         asked = self._checked(action)
         limit = self.parameters.acceleration_max
         command = min(max(asked, -limit), limit)
-        reference = self._travel_reference
+        travel_reference, hoist_reference = self._references
         diverged = False
         try:
-            drive = self.plant.step(command, self._hoist_reference)
+            drive = self.plant.step(command, hoist_reference)
         except SimulationDivergedError as error:
             drive, diverged = error.drive, True
         self._step_index += 1
@@ -245,7 +246,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         info = self._info(state)
         tracking, sway, effort = self.cost.terms(
             info["payload_velocity"],
-            reference,
+            travel_reference,
             state.cable_length,
             state.sway_angle,
             drive.acceleration,
@@ -290,7 +291,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
                 height=self.render_height,
                 window=self.render_mode == "human",
             )
-        return self._renderer.draw(self._buttons, self._travel_reference)
+        return self._renderer.draw(self._buttons, self._references[0])
 
     def close(self) -> None:
         """Closes the window and frees the graphics memory."""
@@ -315,15 +316,11 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         time = self._step_index * self.parameters.control_period
         buttons = self._operator.press(time, state)
         if buttons is not self._buttons:
-            self._show(buttons)
-
-    def _show(self, buttons: Buttons) -> None:
-        self._buttons = buttons
-        self._travel_reference = buttons.travel * self.parameters.travel_speed
-        self._hoist_reference = buttons.hoist * self.parameters.hoist_speed
+            self._buttons = buttons
+            self._references = buttons.references(self.parameters)
 
     def _observation(self, state: CraneState) -> NDArray[np.float64]:
-        return np.array((*state, self._travel_reference, self._hoist_reference))
+        return np.array((*state, *self._references))
 
     def _info(self, state: CraneState) -> dict[str, Any]:
         return {

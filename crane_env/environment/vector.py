@@ -229,7 +229,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         asked = self._checked_actions(actions, moving)
         limit = self.parameters.acceleration_max
         command = np.clip(asked, -limit, limit)
-        travel_reference, hoist_reference = self._references()
+        travel_reference, hoist_reference = self._operator.references.copy().T
         drive = self.plant.step(command, hoist_reference, moving)
         self._step_index += moving
         states = self.plant.states()
@@ -287,7 +287,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             self._renderer = VectorRenderer(
                 self.plant, width=self.render_width, height=self.render_height
             )
-        return self._renderer.draw(self._operator.buttons, self.parameters.travel_speed)
+        return self._renderer.draw(self._operator.buttons, self._operator.references[:, 0])
 
     def close_extras(self) -> None:
         """Frees the graphics memory."""
@@ -345,15 +345,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._begun[indices] = True
         self._ended[indices] = False
 
-    def _references(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Travel and hoist references [m/s] that the operators ask for, eqs. (4) and (5)."""
-        return (
-            self._operator.travel * self.parameters.travel_speed,
-            self._operator.hoist * self.parameters.hoist_speed,
-        )
-
     def _observe(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.column_stack((states, *self._references()))
+        return np.concatenate((states, self._operator.references), axis=1)
 
     def _signals(self, states: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
         """Info that describes the cranes as they are."""

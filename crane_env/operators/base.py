@@ -42,6 +42,10 @@ class Buttons(NamedTuple):
         """Direction of the cable: -1 up (shortens), +1 down (lengthens), 0 none or both."""
         return int(self.down) - int(self.up)
 
+    def references(self, parameters: CraneParameters) -> tuple[float, float]:
+        """What the pressed buttons ask for: w(k) of eq. (4) and the cable rate of eq. (5) [m/s]."""
+        return self.travel * parameters.travel_speed, self.hoist * parameters.hoist_speed
+
 
 RELEASED = Buttons()
 

@@ -64,8 +64,7 @@ class VectorOperator:
 
     Attributes:
         buttons: pressed, in the order of `Buttons`, shape (N, 4).
-        travel: `Buttons.travel` of each crane, shape (N,).
-        hoist: `Buttons.hoist` of each crane, shape (N,).
+        references: travel and hoist reference of each crane [m/s], shape (N, 2).
 
     Args:
         count: number of cranes, N. An operator takes its place with `reset`.
@@ -73,9 +72,9 @@ class VectorOperator:
 
     def __init__(self, count: int) -> None:
         self.buttons = np.zeros((count, len(Buttons._fields)), dtype=np.bool_)
-        self.travel = np.zeros(count)
-        self.hoist = np.zeros(count)
+        self.references = np.zeros((count, 2))
         self._operators: list[Operator | None] = [None] * count
+        self._parameters: list[CraneParameters | None] = [None] * count
         self._due = np.full(count, np.inf)
 
     def reset(
@@ -88,7 +87,7 @@ class VectorOperator:
     ) -> None:
         """Begins an episode of one crane and reads its buttons at time 0; see `Operator.reset`."""
         operator.reset(rng, start, parameters)
-        self._operators[index] = operator
+        self._operators[index], self._parameters[index] = operator, parameters
         self._ask(index, operator, 0.0, start)
 
     def press(
@@ -110,6 +109,7 @@ class VectorOperator:
     def _ask(self, index: int, operator: Operator, time: float, state: CraneState) -> None:
         buttons = operator.press(time, state)
         self.buttons[index] = buttons
-        self.travel[index] = buttons.travel
-        self.hoist[index] = buttons.hoist
+        parameters = self._parameters[index]
+        assert parameters is not None, "an operator operates a crane"
+        self.references[index] = buttons.references(parameters)
         self._due[index] = operator.due if isinstance(operator, ScheduledOperator) else -np.inf

@@ -212,13 +212,13 @@ class VectorRenderer:
             self._renderers.append(CraneRenderer(twin, width=width, height=height, window=False))
 
     def draw(
-        self, buttons: NDArray[np.bool_], travel_speed: float
+        self, buttons: NDArray[np.bool_], travel_references: NDArray[np.float64]
     ) -> tuple[NDArray[np.uint8], ...]:
         """Draws the cranes as they are now.
 
         Args:
             buttons: that each operator presses, in the order of `Buttons`, shape (N, 4).
-            travel_speed: that a travel button asks for [m/s].
+            travel_references: that each operator asks for [m/s], shape (N,).
 
         Returns:
             The pixels of each, uint8, shape (height, width, 3).
@@ -227,7 +227,7 @@ class VectorRenderer:
         for index, (twin, renderer) in enumerate(zip(self._copies, self._renderers, strict=True)):
             self._plant.copy_to(index, twin)
             pressed = Buttons(*buttons[index].tolist())
-            picture = renderer.draw(pressed, pressed.travel * travel_speed)
+            picture = renderer.draw(pressed, float(travel_references[index]))
             assert picture is not None, "a renderer without a window returns its pixels"
             pictures.append(picture)
         return tuple(pictures)

@@ -68,8 +68,7 @@ def test_presses_are_those_of_each_alone_and_only_who_is_due_is_asked() -> None:
         before, pressed = pressed, [one.press(0.02 * step, START) for one in alone]
         vector.press(np.full(4, 0.02 * step), states, live)
         assert [Buttons(*row) for row in vector.buttons.tolist()] == pressed
-        assert vector.travel.tolist() == [one.travel for one in pressed]
-        assert vector.hoist.tolist() == [one.hoist for one in pressed]
+        assert vector.references.tolist() == [list(one.references(PAPER)) for one in pressed]
         changes += sum(one != other for one, other in zip(before, pressed, strict=True))
     asked = sum(one.asked for one in together) - len(names)
     assert changes <= asked <= 1.2 * changes
