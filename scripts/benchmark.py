@@ -38,7 +38,8 @@ from baselines.mpc.linear import LinearMpc
 from baselines.mpc.prediction.cable import measured_cable_rate
 from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller
-from crane_env.plant.single import build_model, place
+from crane_env.plant.single import build_model
+from crane_env.plant.start import AT_REST
 
 
 @dataclass(frozen=True)
@@ -309,7 +310,7 @@ def benchmark_vector(rounds: int) -> list[Timing]:
     parameters = crane_env.CraneParameters()
     cores = available_cores()
     batch = Batch(build_model(parameters), VECTOR_SIZE, cores)
-    batch.bind("qpos")[:] = place(parameters).position
+    batch.bind("qpos")[:] = AT_REST.coordinates(parameters).position
     batch.forward()
     action = np.random.default_rng(0).uniform(-0.1, 0.1, (VECTOR_SIZE, 1))
     before = resident_memory()

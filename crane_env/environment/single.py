@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from crane_env.environment.options import check_names, start_of
 from crane_env.kinematics import payload_position, payload_velocity
 from crane_env.observation import CraneState, Observation, observation_space
 from crane_env.operators.base import RELEASED
@@ -21,9 +22,6 @@ from crane_env.stage_cost import StageCost
 
 if TYPE_CHECKING:
     from crane_env.rendering.scene import CraneRenderer
-
-RESET_STATE = ("cable_length", "sway_angle", "sway_rate", "trolley_position", "trolley_velocity")
-"""Options of `reset` that place the crane; see `Plant.reset` for units and ranges."""
 
 ACTION_ROUNDING = 1e-6
 """Share of the limit by which an action may exceed it by rounding to float32."""
@@ -189,21 +187,20 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
 
         Args:
             seed: seeds the episodes from this one on; the operator is part of them.
-            options: any of `RESET_STATE` and `operator`, for this episode only.
+            options: any field of `Start` and `operator`, for this episode only.
 
         Raises:
             ValueError: an unknown option, or a value out of range; the crane stays as it was.
         """
         placed = dict(options or {})
+        check_names(placed, "operator")
         operator = self._default_operator
         if "operator" in placed:
             operator = make_operator(placed.pop("operator"))
-        unknown = sorted(set(placed) - set(RESET_STATE))
-        if unknown:
-            valid = ", ".join((*RESET_STATE, "operator"))
-            raise ValueError(f"Unknown reset option {unknown[0]!r}; valid: {valid}.")
+        start = start_of(placed)
+        start.coordinates(self.parameters)
         super().reset(seed=seed)
-        self.plant.reset(**{name: float(value) for name, value in placed.items()})
+        self.plant.reset(start)
         self._operator = operator
         self._step_index = 0
         state = self.plant.state()

@@ -15,17 +15,22 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from crane_env.environment.options import (
+    check_names,
+    chosen_by,
+    seeds_of_each,
+    starts_of_each,
+)
 from crane_env.environment.randomisation import Randomisation
 from crane_env.environment.single import ACTION_ROUNDING
 from crane_env.environment.vector_info import lay_out, lay_out_objects
-from crane_env.environment.vector_reset import chosen_by, seeds_of_each, starts_of_each
 from crane_env.kinematics import payload_position, payload_velocity
 from crane_env.observation import CraneState, observation_space
 from crane_env.operators.base import Operator
 from crane_env.operators.batch import VectorOperator, VectorOperatorSpec, make_operators
 from crane_env.parameters import CraneParameters
 from crane_env.plant.batch import VectorDriveReport, VectorPlant
-from crane_env.plant.single import place
+from crane_env.plant.start import AT_REST, Start
 from crane_env.stage_cost import StageCost
 
 if TYPE_CHECKING:
@@ -163,7 +168,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
 
         Args:
             seed: seeds the episodes from this one on; crane i gets seed + i or entry i of a list.
-            options: any of `RESET_STATE`, `operator` and `reset_mask` (bool, shape (N,)), for these
+            options: any field of `Start`, `operator` and `reset_mask` (bool, shape (N,)), for these
                 episodes only; what concerns cranes out of the mask is ignored.
 
         Returns:
@@ -176,6 +181,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             ResetNeeded: a mask, before all cranes were reset once.
         """
         placed = dict(options or {})
+        check_names(placed, "operator", "reset_mask")
         chosen = np.ones(self.num_envs, dtype=np.bool_)
         if "reset_mask" in placed:
             chosen = chosen_by(placed.pop("reset_mask"), self.num_envs)
@@ -259,7 +265,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             infos["_final_info"] = beginning.copy()
         if beginning.any():
             indices = np.flatnonzero(beginning)
-            self._begin(indices, self._default_operators, [{}] * len(indices))
+            self._begin(indices, self._default_operators, [AT_REST] * len(indices))
             states = self.plant.states()
             signals = self._signals(states)
         infos |= lay_out(signals, np.ones(self.num_envs, dtype=np.bool_))
@@ -319,7 +325,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self,
         indices: NDArray[np.intp],
         operators: Sequence[Operator],
-        starts: Sequence[Mapping[str, float]],
+        starts: Sequence[Start],
     ) -> None:
         """Begins an episode of each of some cranes, where its start says."""
         cranes, streams = [], []
@@ -334,9 +340,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
                 crane = self.randomisation.draw(np.random.default_rng((number, 1)), crane)
             cranes.append(crane)
         self.plant.exchange(indices, cranes)
-        self.plant.reset(
-            indices, [place(crane, **start) for crane, start in zip(cranes, starts, strict=True)]
-        )
+        self.plant.reset(indices, starts)
         states = self.plant.states()
         for index, crane, stream in zip(indices.tolist(), cranes, streams, strict=True):
             start = CraneState(*states[index].tolist())

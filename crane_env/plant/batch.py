@@ -24,18 +24,21 @@ from crane_env.plant.single import (
     REACH,
     SETPOINT,
     SWAY,
-    Coordinates,
     Plant,
     build_model,
     cable_gains,
     cable_pull,
     drive_loops,
     drum_stroke,
-    place,
 )
+from crane_env.plant.start import AT_REST, Start
 
 VARIABLE = ("payload_mass", "cable_stiffness", "cable_length_initial", "drive_bandwidth")
 """Parameters in which cranes that are stepped together may differ."""
+
+SHARED = tuple(
+    field.name for field in dataclasses.fields(CraneParameters) if field.name not in VARIABLE
+)
 
 
 class VectorDriveReport(NamedTuple):
@@ -95,7 +98,7 @@ class VectorPlant:
         self._substeps = cranes[0].substeps
         everyone = np.arange(len(cranes))
         self.exchange(everyone, cranes)
-        self.reset(everyone, [place(crane) for crane in cranes])
+        self.reset(everyone, [AT_REST] * len(cranes))
 
     def __len__(self) -> int:
         """Number of cranes, N."""
@@ -148,16 +151,23 @@ class VectorPlant:
         if heavier:
             self._batch.set_const(heavier)
 
-    def reset(self, indices: NDArray[np.intp], starts: Sequence[Coordinates]) -> None:
+    def reset(self, indices: NDArray[np.intp], starts: Sequence[Start]) -> None:
         """Places cranes with their hoists at rest.
 
         Args:
             indices: which cranes, in ascending order.
-            starts: where each of them begins, from `place`.
+            starts: where each of them begins.
+
+        Raises:
+            ValueError: a value outside its range; all cranes stay where they are.
         """
+        places = [
+            start.coordinates(self.cranes[index])
+            for index, start in zip(indices.tolist(), starts, strict=True)
+        ]
         self._batch.reset(indices, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        self._position[indices] = [start.position for start in starts]
-        self._velocity[indices] = [start.velocity for start in starts]
+        self._position[indices] = [place.position for place in places]
+        self._velocity[indices] = [place.velocity for place in places]
         gains = cable_gains(self._stiffness[indices], self._damping, self._position[indices, DRUM])
         for column, gain in enumerate(gains):
             self._cable_gains[indices, column] = gain
@@ -241,14 +251,9 @@ def check_alike(crane: CraneParameters, reference: CraneParameters) -> None:
     """
     if crane is reference:
         return
-    for name in _SHARED:
+    for name in SHARED:
         if getattr(crane, name) != getattr(reference, name):
             raise ValueError(
                 f"Cranes that are stepped together may differ in {', '.join(VARIABLE)}, not in "
                 f"{name} ({getattr(crane, name)!r} and {getattr(reference, name)!r})."
             )
-
-
-_SHARED = tuple(
-    field.name for field in dataclasses.fields(CraneParameters) if field.name not in VARIABLE
-)

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -30,13 +30,10 @@ from numpy.typing import NDArray
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
 from crane_env.plant.drives import DriveReport, Drives, Stroke
+from crane_env.plant.start import AT_REST, Start
 
-
-class Coordinates(NamedTuple):
-    """Joint positions and velocities, in the order of `SETPOINT` to `DRUM`; SI units."""
-
-    position: tuple[float, float, float, float, float]
-    velocity: tuple[float, float, float, float, float]
+SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
+"""Places of the joints among positions and velocities."""
 
 
 def build_model(parameters: CraneParameters) -> mujoco.MjModel:
@@ -81,51 +78,6 @@ def drum_stroke(parameters: CraneParameters) -> Stroke:
     return Stroke.between(
         parameters.unstretched_length(parameters.cable_length_min),
         parameters.unstretched_length(parameters.cable_length_max),
-    )
-
-
-def place(
-    parameters: CraneParameters,
-    *,
-    trolley_position: float = 0.0,
-    trolley_velocity: float = 0.0,
-    cable_length: float | None = None,
-    sway_angle: float = 0.0,
-    sway_rate: float = 0.0,
-) -> Coordinates:
-    """Places a crane with the hoist at rest and the cable in balance.
-
-    Args:
-        parameters: the crane.
-        trolley_position: within the limit switches [m].
-        trolley_velocity: within the speed limit [m/s].
-        cable_length: sheave to payload, within the hoist limits [m]; None: the initial length.
-        sway_angle: clear of the girder [rad].
-        sway_rate: [rad/s].
-
-    Raises:
-        ValueError: a value outside its range.
-    """
-    length = parameters.cable_length_initial if cable_length is None else cable_length
-    rail = parameters.trolley_position_limit
-    speed_max = parameters.trolley_speed_max
-    ranges = {
-        "trolley_position": (trolley_position, -rail, rail, "m"),
-        "trolley_velocity": (trolley_velocity, -speed_max, speed_max, "m/s"),
-        "cable_length": (length, parameters.cable_length_min, parameters.cable_length_max, "m"),
-        "sway_angle": (sway_angle, -MAX_INITIAL_SWAY, MAX_INITIAL_SWAY, "rad"),
-        "sway_rate": (sway_rate, -MAX_INITIAL_SWAY_RATE, MAX_INITIAL_SWAY_RATE, "rad/s"),
-    }
-    for name, (value, low, high, unit) in ranges.items():
-        if not low <= value <= high:
-            raise ValueError(f"{name} must be from {low:.6g} to {high:.6g} {unit}, not {value!r}.")
-    tension = parameters.payload_mass * (
-        parameters.gravity * math.cos(sway_angle) + length * sway_rate**2
-    )
-    drum = length / (1.0 + tension / parameters.cable_stiffness)
-    return Coordinates(
-        (trolley_position, 0.0, sway_angle, length, drum),
-        (trolley_velocity, 0.0, sway_rate, 0.0, 0.0),
     )
 
 
@@ -182,28 +134,13 @@ class Plant:
         mujoco.mj_setState(self.model, self.data, saved["state"], signature)
         mujoco.mj_forward(self.model, self.data)
 
-    def reset(
-        self,
-        *,
-        trolley_position: float = 0.0,
-        trolley_velocity: float = 0.0,
-        cable_length: float | None = None,
-        sway_angle: float = 0.0,
-        sway_rate: float = 0.0,
-    ) -> None:
-        """Places the crane as `place` does; refused, it stays where it is.
+    def reset(self, start: Start = AT_REST) -> None:
+        """Places the crane; refused, it stays where it is.
 
         Raises:
             ValueError: a value outside its range.
         """
-        position, velocity = place(
-            self.parameters,
-            trolley_position=trolley_position,
-            trolley_velocity=trolley_velocity,
-            cable_length=cable_length,
-            sway_angle=sway_angle,
-            sway_rate=sway_rate,
-        )
+        position, velocity = start.coordinates(self.parameters)
         mujoco.mj_resetData(self.model, self.data)
         self._position[:] = position
         self._velocity[:] = velocity
@@ -334,12 +271,3 @@ class Plant:
         """Payload in the plane: along the girder, and height above the sheave [m], shape (2,)."""
         reach, sway = self.cable_length, self.sway_angle
         return np.array([self.trolley_position + reach * math.sin(sway), -reach * math.cos(sway)])
-
-
-SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
-
-MAX_INITIAL_SWAY = math.radians(80.0)
-"""Widest sway that a reset may ask for [rad]; at 85 degrees the payload meets the girder."""
-
-MAX_INITIAL_SWAY_RATE = 2.0
-"""Fastest sway that a reset may ask for [rad/s]."""

@@ -16,6 +16,7 @@ from scipy.special import jv, yv
 from crane_env.kinematics import payload_velocity
 from crane_env.parameters import CraneParameters
 from crane_env.plant.single import Plant, SimulationDivergedError
+from crane_env.plant.start import Start
 from tests.plant.elastic_crane import simulate
 
 PAPER = CraneParameters.paper()
@@ -42,7 +43,7 @@ def measured_period(plant: Plant, steps: int) -> float:
 @pytest.mark.parametrize("length", [1.0, 5.0, 10.0])
 def test_sway_period_with_driven_trolley_is_that_of_the_pendulum(length: float) -> None:
     plant = Plant(PAPER)
-    plant.reset(cable_length=length, sway_angle=0.02)
+    plant.reset(Start(cable_length=length, sway_angle=0.02))
     expected = 2 * math.pi * math.sqrt(length / PAPER.gravity)
     assert measured_period(plant, 2500) == pytest.approx(expected, rel=3e-3)
     assert PAPER.sway_period(length) == pytest.approx(expected, rel=1e-12)
@@ -50,7 +51,7 @@ def test_sway_period_with_driven_trolley_is_that_of_the_pendulum(length: float) 
 
 def test_sway_period_with_free_trolley_is_stiffened_by_the_mass_ratio() -> None:
     plant = Plant(replace(drive_bandwidth=0.0))
-    plant.reset(cable_length=5.0, sway_angle=0.02)
+    plant.reset(Start(cable_length=5.0, sway_angle=0.02))
     expected = 2 * math.pi * math.sqrt(5.0 / (9.81 * (1 + 100 / 600)))
     assert measured_period(plant, 2500) == pytest.approx(expected, rel=3e-3)
     assert PAPER.sway_period(5.0, trolley_free=True) == pytest.approx(expected, rel=1e-12)
@@ -59,7 +60,7 @@ def test_sway_period_with_free_trolley_is_stiffened_by_the_mass_ratio() -> None:
 @pytest.mark.parametrize("length", [1.0, 5.0, 10.0])
 def test_static_stretch_is_weight_over_stiffness(length: float) -> None:
     plant = Plant(PAPER)
-    plant.reset(cable_length=length)
+    plant.reset(Start(cable_length=length))
     for _ in range(500):
         plant.step(0.0, 0.0)
     stretch = plant.cable_length - plant.unstretched_length
@@ -76,7 +77,7 @@ def test_axial_oscillation_has_the_frequency_and_damping_of_a_spring_in_series(
 ) -> None:
     fine = replace(physics_step=0.0001, control_period=0.001)
     plant = Plant(fine)
-    plant.reset(cable_length=length)
+    plant.reset(Start(cable_length=length))
     plant.data.qpos[3] += 2e-4
     stretch = []
     for _ in range(1500):
@@ -93,7 +94,7 @@ def test_axial_oscillation_has_the_frequency_and_damping_of_a_spring_in_series(
 
 def test_free_sway_loses_less_than_one_percent_in_a_minute() -> None:
     plant = Plant(PAPER)
-    plant.reset(cable_length=5.0, sway_angle=0.1)
+    plant.reset(Start(cable_length=5.0, sway_angle=0.1))
     sway = []
     for _ in range(3000):
         plant.step(0.0, 0.0)
@@ -104,7 +105,7 @@ def test_free_sway_loses_less_than_one_percent_in_a_minute() -> None:
 
 def test_a_soft_drive_with_its_position_loop_barely_damps_the_sway() -> None:
     plant = Plant(replace(drive_bandwidth=100.0))
-    plant.reset(cable_length=5.0, sway_angle=0.1)
+    plant.reset(Start(cable_length=5.0, sway_angle=0.1))
     sway = []
     for _ in range(3000):
         plant.step(0.0, 0.0)
@@ -114,7 +115,7 @@ def test_a_soft_drive_with_its_position_loop_barely_damps_the_sway() -> None:
 
 def test_a_slack_cable_has_no_tension_and_the_payload_falls_at_g() -> None:
     plant = Plant(PAPER)
-    plant.reset(cable_length=2.0)
+    plant.reset(Start(cable_length=2.0))
     plant.data.qpos[4] = 12.0  # cut the support: ten metres of slack
     speeds = []
     for _ in range(50):
@@ -133,7 +134,7 @@ def test_tension_is_never_negative_and_is_the_force_of_the_simulation() -> None:
     slack = 0
     for step in range(100_000):
         if step % 500 == 0:
-            plant.reset(cable_length=rng.uniform(2, 10), sway_angle=rng.uniform(-0.5, 0.5))
+            plant.reset(Start(cable_length=rng.uniform(2, 10), sway_angle=rng.uniform(-0.5, 0.5)))
         if step % 10 == 0:
             acceleration = rng.uniform(-5, 5)
             hoist = float(rng.choice([-1.0, 0.0, 1.0]))
@@ -153,7 +154,7 @@ def test_a_true_hoist_step_throws_the_cable_slack_and_the_ramp_keeps_it_taut() -
     slack = {}
     for ramp in (0.0, 0.3):
         plant = Plant(replace(hoist_ramp_time=ramp, physics_step=0.0005))
-        plant.reset(cable_length=8.0)
+        plant.reset(Start(cable_length=8.0))
         tensions = []
         for _ in range(200):
             plant.step(0.0, -1.0)
@@ -172,7 +173,7 @@ def test_energy_audit_closes_over_hoisting_and_travelling(
     """Drive work + hoist work - dissipation = change of kinetic, potential and elastic energy."""
     parameters = replace(trolley_friction=50.0, sway_friction=20.0)
     plant = Plant(parameters)
-    plant.reset(cable_length=8.0)
+    plant.reset(Start(cable_length=8.0))
     p = parameters
 
     def energy() -> float:
@@ -252,7 +253,7 @@ def against_ode(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Payload velocities of plant and ODE at the control steps, for the same inputs [m/s]."""
     plant = Plant(parameters)
-    plant.reset(cable_length=6.0)
+    plant.reset(Start(cable_length=6.0))
     start = np.array([0, 0, 0, 0, plant.cable_length, 0, plant.unstretched_length, 0])
     accelerations, references = random_drive(steps, seed)
     simulated, hoist_rates = [], [0.0]
@@ -292,7 +293,7 @@ def test_with_a_stiff_cable_the_plant_converges_to_equation_1() -> None:
             cable_stiffness=1e6 * factor, cable_damping=1e3 * math.sqrt(factor), physics_step=0.0002
         )
         plant = Plant(parameters)
-        plant.reset(cable_length=6.0)
+        plant.reset(Start(cable_length=6.0))
         accelerations, references = random_drive(400, seed=5)
         x = np.array([6.0, 0.0, 0.0])
         rate, speed, worst = 0.0, 0.0, []
@@ -330,7 +331,7 @@ def test_hoisting_from_5_to_1_m_follows_the_bessel_solution() -> None:
     """Equation l theta'' + 2 l' theta' + g theta = 0 with l = l_0 - v t, as a trajectory."""
     v, g, l0, theta0 = 1.0, 9.81, 5.0, 0.05
     plant = Plant(replace(hoist_ramp_time=0.0, cable_length_min=0.2))
-    plant.reset(cable_length=l0, sway_angle=theta0)
+    plant.reset(Start(cable_length=l0, sway_angle=theta0))
     # Begin at the hoisting equilibrium: a step of the hoist would add an axial bounce.
     plant.data.qvel[3] = -v
 
@@ -353,7 +354,7 @@ def test_hoisting_from_5_to_1_m_follows_the_bessel_solution() -> None:
 
 def test_sway_grows_as_length_to_the_minus_three_quarters_when_hoisting_slowly() -> None:
     plant = Plant(replace(hoist_speed=0.05))
-    plant.reset(cable_length=10.0, sway_angle=0.05)
+    plant.reset(Start(cable_length=10.0, sway_angle=0.05))
     extremes, lengths, sway = [], [], [0.05, 0.05]
     for _ in range(6000):
         plant.step(0.0, -0.05)
@@ -369,7 +370,7 @@ def test_sway_grows_as_length_to_the_minus_three_quarters_when_hoisting_slowly()
 def test_a_bang_on_the_trolley_leaves_the_sway_of_the_closed_form() -> None:
     for length, degrees in ((1.0, 18.3), (5.0, 8.2), (10.0, 5.8)):
         plant = Plant(replace(acceleration_max=50.0))
-        plant.reset(cable_length=length)
+        plant.reset(Start(cable_length=length))
         plant.step(50.0, 0.0)
         sway = []
         for _ in range(400):
@@ -405,7 +406,7 @@ def test_a_payload_that_swings_too_far_meets_the_girder_and_not_the_sheave() -> 
         plant = Plant(parameters)
         rng = np.random.default_rng(0)
         for _ in range(5):
-            plant.reset(sway_angle=1.3, sway_rate=2.0, cable_length=rng.uniform(2.0, 9.0))
+            plant.reset(Start(sway_angle=1.3, sway_rate=2.0, cable_length=rng.uniform(2.0, 9.0)))
             for _ in range(1000):
                 plant.step(math.copysign(5.0, plant.sway_rate), -1.0)
                 assert abs(plant.sway_angle) < math.radians(95.0)
@@ -426,7 +427,7 @@ def test_a_diverged_simulation_leaves_the_crane_where_it_was() -> None:
 
 def test_a_free_trolley_is_caught_by_the_buffers() -> None:
     plant = Plant(replace(drive_bandwidth=0.0))
-    plant.reset(trolley_position=19.0, trolley_velocity=1.0)
+    plant.reset(Start(trolley_position=19.0, trolley_velocity=1.0))
     for _ in range(300):
         plant.step(0.0, 0.0)
         assert plant.trolley_position < 20.1
@@ -444,7 +445,7 @@ def test_the_trolley_follows_the_commanded_acceleration() -> None:
 
 def test_a_copy_continues_bit_for_bit() -> None:
     plant = Plant(PAPER)
-    plant.reset(cable_length=5.0, sway_angle=0.1)
+    plant.reset(Start(cable_length=5.0, sway_angle=0.1))
     for _ in range(100):
         plant.step(0.7, -1.0)
     for twin in (copy.deepcopy(plant), pickle.loads(pickle.dumps(plant))):
@@ -459,7 +460,13 @@ def test_a_copy_continues_bit_for_bit() -> None:
 def test_every_named_quantity_agrees_with_the_state() -> None:
     plant = Plant(PAPER)
     plant.reset(
-        trolley_position=1.0, trolley_velocity=0.5, cable_length=4.0, sway_angle=0.2, sway_rate=0.1
+        Start(
+            trolley_position=1.0,
+            trolley_velocity=0.5,
+            cable_length=4.0,
+            sway_angle=0.2,
+            sway_rate=0.1,
+        )
     )
     s = plant.state()
     assert s == (1.0, 0.5, 4.0, 0.0, 0.2, 0.1)
@@ -483,4 +490,4 @@ def test_every_named_quantity_agrees_with_the_state() -> None:
 )
 def test_reset_refuses_what_is_out_of_range_and_names_it(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=rf"{name} must be from .* to .*"):
-        Plant(PAPER).reset(**{name: value})
+        Plant(PAPER).reset(Start(**{name: value}))

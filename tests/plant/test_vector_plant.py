@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from crane_env.parameters import CraneParameters
 from crane_env.plant.batch import VARIABLE, VectorPlant
-from crane_env.plant.single import Plant, place
+from crane_env.plant.single import Plant
+from crane_env.plant.start import AT_REST, Start
 
 PAPER = CraneParameters.paper()
 SHORT_RAIL = CraneParameters(rail_half_length=3.0, limit_switch_margin=0.0, drive_bandwidth=40.0)
@@ -115,7 +116,7 @@ def test_a_crane_that_was_exchanged_is_as_one_built_with_its_parameters() -> Non
         cranes.step(*commands.at(step), everyone)
     changed = np.array([1, 3])
     cranes.exchange(changed, [parameters[1], parameters[3]])
-    starts = [place(parameters[k], sway_angle=0.1, trolley_position=1.0) for k in (1, 3)]
+    starts = [Start(sway_angle=0.1, trolley_position=1.0) for k in (1, 3)]
     cranes.reset(changed, starts)
     assert cranes.cranes == [PAPER, parameters[1], PAPER, parameters[3]]
     singles = [Plant(parameters[k]) for k in (1, 3)]
@@ -132,7 +133,7 @@ def test_a_crane_that_was_exchanged_is_as_one_built_with_its_parameters() -> Non
 
 def test_a_slack_cable_has_no_tension() -> None:
     cranes = VectorPlant([PAPER] * 2)
-    cranes.reset(np.array([1]), [place(PAPER, sway_angle=1.3)])
+    cranes.reset(np.array([1]), [Start(sway_angle=1.3)])
     everyone, slackest = np.ones(2, dtype=bool), np.inf
     for _ in range(150):
         cranes.step(np.array([0.0, -5.0]), np.array([0.0, 1.0]), everyone)
@@ -155,7 +156,7 @@ def test_a_diverged_crane_is_reported_and_put_back_and_the_others_do_not_notice(
     untouched.step(np.full(3, 1.0), zero, everyone)
     assert report.failed.tolist() == [False, True, False]
     assert cranes.states()[1].tolist() == before[1].tolist()
-    cranes.reset(np.array([1]), [place(PAPER)])
+    cranes.reset(np.array([1]), [AT_REST])
     assert not cranes.step(zero, zero, everyone).failed.any()
     untouched.step(zero, zero, everyone)
     assert cranes.states()[[0, 2]].tobytes() == untouched.states()[[0, 2]].tobytes()

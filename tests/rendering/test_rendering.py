@@ -26,6 +26,7 @@ import crane_env  # noqa: F401  (registers OILCrane-v0)
 from crane_env.operators.base import RELEASED, Buttons
 from crane_env.parameters import CraneParameters
 from crane_env.plant.single import Plant
+from crane_env.plant.start import Start
 from crane_env.rendering import canvas, opengl
 from crane_env.rendering.canvas import SMALLEST_PICTURE, Pace, WindowCanvas
 from crane_env.rendering.hall import floor_depth, hall, marks
@@ -52,7 +53,7 @@ class Drawn:
     def draw(
         self, buttons: Buttons = RELEASED, travel_reference: float = 0.0, **state: float
     ) -> Picture:
-        self.plant.reset(**state)
+        self.plant.reset(Start(**state))
         picture = self.renderer.draw(buttons, travel_reference)
         assert picture is not None
         return picture

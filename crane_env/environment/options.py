@@ -1,0 +1,104 @@
+"""Options: what the arguments of `reset` say for one crane or for each of many."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crane_env.parameters import CraneParameters
+from crane_env.plant.start import Start
+from crane_env.support.checks import choice, real
+
+
+def start_of(options: Mapping[str, Any]) -> Start:
+    """Where options of numbers let a crane begin.
+
+    Raises:
+        ValueError: a value that is no number.
+    """
+    return Start(**{name: real(name, value) for name, value in options.items()})
+
+
+def check_names(options: Mapping[str, Any], *others: str) -> None:
+    """Makes sure that options of `reset` are fields of `Start` or one of some others.
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    for name in options:
+        choice("reset option", name, (*Start._fields, *others))
+
+
+def starts_of_each(
+    options: Mapping[str, Any], chosen: NDArray[np.bool_], parameters: CraneParameters
+) -> list[Start]:
+    """Where each of the chosen cranes begins.
+
+    Args:
+        options: a number, or a sequence or array with one for each crane, for fields of `Start`.
+        chosen: the cranes that are reset, shape (N,).
+        parameters: the cranes' limits.
+
+    Raises:
+        ValueError: a sequence of another length, or a value that is no number or out of its range.
+    """
+    columns: dict[str, list[Any]] = {}
+    for name, value in options.items():
+        listed = value.tolist() if isinstance(value, np.ndarray) else value
+        if not isinstance(listed, (list, tuple)):
+            listed = [listed] * len(chosen)
+        if len(listed) != len(chosen):
+            raise ValueError(
+                f"{name} must be a number or one for each of the {len(chosen)} environments, "
+                f"not {len(listed)}."
+            )
+        columns[name] = list(listed)
+    starts = []
+    for index in np.flatnonzero(chosen).tolist():
+        try:
+            start = start_of({name: column[index] for name, column in columns.items()})
+            start.coordinates(parameters)
+        except ValueError as error:
+            raise ValueError(f"Environment {index}: {error}") from error
+        starts.append(start)
+    return starts
+
+
+def chosen_by(mask: object, count: int) -> NDArray[np.bool_]:
+    """The cranes that a `reset_mask` chooses, shape (count,).
+
+    Raises:
+        TypeError: the mask is no boolean array.
+        ValueError: it has another shape or chooses none.
+    """
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+        kind = mask.dtype if isinstance(mask, np.ndarray) else type(mask).__name__
+        raise TypeError(f"reset_mask must be a numpy array of bool, not {kind}.")
+    if mask.shape != (count,):
+        raise ValueError(f"reset_mask must have shape ({count},), not {mask.shape}.")
+    if not mask.any():
+        raise ValueError("reset_mask must choose at least one environment.")
+    return mask.copy()
+
+
+def seeds_of_each(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
+    """The seed of each crane: seed + i, entry i of a list, or None.
+
+    Raises:
+        ValueError: a list of another length.
+    """
+    if seed is None:
+        return [None] * count
+    if isinstance(seed, Integral):
+        return [int(seed) + index for index in range(count)]
+    given: Any = seed
+    seeds = [None if one is None else int(one) for one in given]
+    if len(seeds) != count:
+        raise ValueError(
+            f"A list of seeds needs one for each of the {count} environments, not {len(seeds)}."
+        )
+    return seeds
