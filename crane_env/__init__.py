@@ -9,7 +9,7 @@ import gymnasium
 
 from crane_env.controller import Controller
 from crane_env.episode.metrics import Metrics
-from crane_env.episode.play import run_episode
+from crane_env.episode.play import run_episode, run_episodes
 from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import CraneState, Observation
 from crane_env.operators.base import ButtonEvent, Buttons, Operator
@@ -52,5 +52,6 @@ __all__ = [
     "make_operator",
     "read_script",
     "run_episode",
+    "run_episodes",
     "write_script",
 ]

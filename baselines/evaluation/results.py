@@ -178,6 +178,7 @@ class ResultsFolder:
             if result.metrics is not None
         ]
         types = {"str": pyarrow.string(), "int": pyarrow.int64(), "float": pyarrow.float64()}
+        types["bool"] = pyarrow.bool_()
         columns = {"controller": "str", "operator": "str", "seed": "int", "setup": "str"}
         columns |= {field.name: str(field.type) for field in dataclasses.fields(Metrics)}
         schema = pyarrow.schema(

@@ -30,6 +30,8 @@ ACTION_ROUNDING = 1e-6
 class StepRecord(NamedTuple):
     """The plant's own truth after one control period or a reset, which no wrapper has touched.
 
+    Floats of one crane, arrays of shape (N,) of many.
+
     Attributes:
         time: since the reset [s].
         observation: state of the plant and the references now in force.
@@ -38,11 +40,11 @@ class StepRecord(NamedTuple):
         reward: [m^2/s]; 0 at reset.
     """
 
-    time: float
+    time: Any
     observation: Observation
     info: dict[str, Any]
-    action: float
-    reward: float
+    action: Any
+    reward: Any
 
 
 class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):

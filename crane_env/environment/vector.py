@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
@@ -22,10 +22,10 @@ from crane_env.environment.options import (
     starts_of_each,
 )
 from crane_env.environment.randomisation import Randomisation
-from crane_env.environment.single import ACTION_ROUNDING
+from crane_env.environment.single import ACTION_ROUNDING, StepRecord
 from crane_env.environment.vector_info import lay_out, lay_out_objects
 from crane_env.kinematics import payload_position, payload_velocity
-from crane_env.observation import CraneState, observation_space
+from crane_env.observation import CraneState, Observation, observation_space
 from crane_env.operators.base import Operator
 from crane_env.operators.batch import VectorOperator, VectorOperatorSpec, make_operators
 from crane_env.parameters import CraneParameters
@@ -67,6 +67,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
     payload thrown over the girder can do that) stays where it was before the step, its episode is
     truncated too, and `info` has `simulation_failed`. Not terminated: rewards are negative, and a
     learner would learn to crash. The other cranes do not notice.
+
+    ## Truth behind wrappers
+
+    As of `OILCraneEnv`: `recorder` is called with a `StepRecord` whose values are arrays over the
+    cranes; the time of a crane that has just been placed is 0.
 
     ## Domain randomisation
 
@@ -152,6 +157,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._begun = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
         self._renderer: VectorRenderer | None = None
+        self.recorder: Callable[[StepRecord], None] | None = None
 
     @property
     def cranes(self) -> tuple[CraneParameters, ...]:
@@ -202,7 +208,9 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             self._randoms[index] = random
         self._begin(indices, operators, starts)
         states = self.plant.states()
-        return self._observe(states), lay_out(self._signals(states), chosen)
+        signals = self._signals(states)
+        self._record(states, signals, np.full(self.num_envs, np.nan), np.zeros(self.num_envs))
+        return self._observe(states), lay_out(signals, chosen)
 
     def step(
         self, actions: NDArray[Any]
@@ -268,6 +276,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             self._begin(indices, self._default_operators, [AT_REST] * len(indices))
             states = self.plant.states()
             signals = self._signals(states)
+        self._record(states, {**signals, **earned}, asked, rewards)
         infos |= lay_out(signals, np.ones(self.num_envs, dtype=np.bool_))
         infos |= lay_out(earned, moving)
         return self._observe(states), rewards, terminations, truncations, infos
@@ -302,8 +311,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             self._renderer = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the graphics: a copy continues bit for bit and draws for itself."""
-        return {**self.__dict__, "_renderer": None}
+        """Everything but graphics and recorder: a copy continues bit for bit, draws for itself."""
+        return {**self.__dict__, "_renderer": None, "recorder": None}
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -351,6 +360,20 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
 
     def _observe(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.concatenate((states, self._operator.references), axis=1)
+
+    def _record(
+        self,
+        states: NDArray[np.float64],
+        info: dict[str, Any],
+        asked: NDArray[np.float64],
+        rewards: NDArray[np.float64],
+    ) -> None:
+        if self.recorder is None:
+            return
+        times = np.multiply(self._step_index, self.parameters.control_period, dtype=np.float64)
+        truth = Observation._make((*states.T.copy(), *self._references()))
+        own = {name: values.copy() for name, values in info.items()}
+        self.recorder(StepRecord(times, truth, own, asked, rewards.copy()))
 
     def _signals(self, states: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
         """Info that describes the cranes as they are."""

@@ -48,6 +48,8 @@ class Metrics:
         act_max: longest `act` [s].
         act_late: share of `act` calls longer than the control period [-].
         solver_failures: solves that ended without a plan [-]; 0 for controllers that solve none.
+        simulation_failed: the simulation diverged and ended the episode early; the indices are of
+            what was played until then and belong in no mean.
     """
 
     IAE: float
@@ -66,6 +68,7 @@ class Metrics:
     act_max: float
     act_late: float
     solver_failures: int
+    simulation_failed: bool
 
     def __str__(self) -> str:
         """One line an index."""

@@ -25,11 +25,12 @@ SPEED_TOLERANCE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Record of an episode, one row a control step: what was observed, done and earned.
+    """Record of an episode, one row a control period: where the crane was, what it did and earned.
 
     All arrays have shape (N,). Positions, velocities and references at row k are those that the
-    controller saw; `action` is its answer, `acceleration` what the drive made of it, and the
-    rewards are those of the step that followed.
+    plant had when its operator's buttons were read; `action` is what the plant was asked for,
+    `acceleration` what its drive made of it, and the rewards are those of the step that followed.
+    Whatever wraps the environment, all of this is the plant's own.
 
     Attributes:
         time: start of the control period [s].
@@ -50,9 +51,12 @@ class Trajectory:
         drive_limited: speed limit or limit switch overruled the action.
         reward: [m^2/s], with its three terms `reward_tracking`, `reward_sway`,
             `reward_acceleration`.
-        act_time: duration of the controller's `act`, by the wall clock [s].
+        act_time: duration of the controller's `act`, by the wall clock [s]; nan in a control period
+            in which it was not asked because a wrapper repeats actions.
         parameters: the crane.
         solver_failures: solves of the controller that ended without a plan.
+        simulation_failed: the simulation diverged in the last step, where the episode ends. What
+            was played until then is no measure of the controller and belongs in no mean.
     """
 
     time: NDArray[np.float64]
@@ -78,6 +82,7 @@ class Trajectory:
     act_time: NDArray[np.float64]
     parameters: CraneParameters
     solver_failures: int = 0
+    simulation_failed: bool = False
 
     def __len__(self) -> int:
         """Number of control steps."""
@@ -105,6 +110,7 @@ class Trajectory:
             "format": FORMAT,
             "parameters": json.dumps(dataclasses.asdict(self.parameters)),
             "solver_failures": str(self.solver_failures),
+            "simulation_failed": json.dumps(self.simulation_failed),
         }
         table = pyarrow.table(self.columns()).replace_schema_metadata(metadata)
         with atomic_file(path) as partial:
@@ -136,6 +142,7 @@ class Trajectory:
             **{name: table[name].to_numpy() for name in table.column_names},
             parameters=CraneParameters.of(json.loads(metadata["parameters"])),
             solver_failures=int(metadata["solver_failures"]),
+            simulation_failed=metadata.get("simulation_failed") == "true",
         )
 
 
@@ -150,7 +157,7 @@ def measure(trajectory: Trajectory) -> Metrics:
     last_samples = max(1, round(last_period / period))
     too_fast = np.abs(trajectory.trolley_velocity) > parameters.trolley_speed_max + SPEED_TOLERANCE
     violations = trajectory.action_clipped | trajectory.drive_limited | too_fast
-    act_time = trajectory.act_time
+    act_time = trajectory.act_time[np.isfinite(trajectory.act_time)]
     return Metrics(
         IAE=integral_absolute_error(
             trajectory.travel_reference, trajectory.payload_velocity, period
@@ -170,4 +177,5 @@ def measure(trajectory: Trajectory) -> Metrics:
         act_max=float(act_time.max()),
         act_late=float(np.mean(act_time > period)),
         solver_failures=trajectory.solver_failures,
+        simulation_failed=trajectory.simulation_failed,
     )

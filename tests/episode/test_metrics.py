@@ -24,7 +24,7 @@ def trajectory(**given: NDArray[np.generic]) -> Trajectory:
     columns = {
         field.name: zeros
         for field in dataclasses.fields(Trajectory)
-        if field.name not in ("parameters", "solver_failures")
+        if field.name not in ("parameters", "solver_failures", "simulation_failed")
     }
     columns |= {"action_clipped": no, "drive_limited": no, "cable_tension": zeros + 981.0}
     columns |= {"cable_length": zeros + 8.0}

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from crane_env import Observation, run_episode
-from crane_env.episode.vector_episode import run_episodes
+from crane_env.episode.play import run_episodes
 
 
 class Proportional:
@@ -61,7 +61,7 @@ def test_each_trajectory_has_the_crane_that_was_drawn_for_it() -> None:
         assert trajectory.cable_tension[0] == pytest.approx(weight, rel=1e-9)
 
 
-def test_a_diverged_crane_has_a_shorter_trajectory(
+def test_a_diverged_crane_has_a_shorter_trajectory_that_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)  # MuJoCo logs the divergence there
@@ -78,6 +78,7 @@ def test_a_diverged_crane_has_a_shorter_trajectory(
 
     recorded = run_episodes(env, Saboteur(), seed=0)
     assert [len(trajectory) for trajectory in recorded] == [30, 12, 30]
+    assert [trajectory.simulation_failed for trajectory in recorded] == [False, True, False]
     for trajectory in recorded:
         assert {len(column) for column in trajectory.columns().values()} == {len(trajectory)}
     undisturbed = run_episodes(make(3, max_episode_steps=30), Proportional(), seed=0)
@@ -94,5 +95,5 @@ def test_what_cannot_be_played_is_refused() -> None:
     with pytest.raises(ValueError, match=r"needs autoreset_mode=AutoresetMode\.NEXT_STEP"):
         run_episodes(make(2, autoreset_mode="SameStep"), Proportional())
     loop = make(2, vectorization_mode="sync")
-    with pytest.raises(ValueError, match="plays OILCraneVectorEnv, not SyncVectorEnv"):
+    with pytest.raises(ValueError, match=r"plays an OILCraneVectorEnv, .* this is SyncVectorEnv"):
         run_episodes(loop, Proportional())
