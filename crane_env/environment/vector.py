@@ -371,7 +371,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         if self.recorder is None:
             return
         times = np.multiply(self._step_index, self.parameters.control_period, dtype=np.float64)
-        truth = Observation._make((*states.T.copy(), *self._references()))
+        truth = Observation._make(self._observe(states).T)
         own = {name: values.copy() for name, values in info.items()}
         self.recorder(StepRecord(times, truth, own, asked, rewards.copy()))
 

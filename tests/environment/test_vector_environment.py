@@ -276,7 +276,11 @@ def test_reset_options_may_differ_from_crane_to_crane() -> None:
             ValueError,
             "Environment 2: cable_length must be from 1 to 12 m, not 40.0",
         ),
-        ({"options": {"sway_angle": [0.1, 0.2]}}, ValueError, "one for each of the 6 environments, not 2"),
+        (
+            {"options": {"sway_angle": [0.1, 0.2]}},
+            ValueError,
+            "one for each of the 6 environments, not 2",
+        ),
         ({"options": {"operator": "nobody"}}, ValueError, "nobody.*valid"),
         ({"options": {"operator": ["random"] * 5}}, ValueError, "one for each of the 6.*not 5"),
         ({"options": {"reset_mask": [True] * 6}}, TypeError, "numpy array of bool, not list"),
