@@ -16,9 +16,13 @@ import numpy as np
 
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
+from crane_env.support.checks import within
 
 EVENT_TOLERANCE = 1e-9
 """Events this close after a control step count at it: rounding of step times [s]."""
+
+LONGEST_TIME = 1e6
+"""Latest time and longest press that an operator may be described by [s]; eleven days."""
 
 
 class Buttons(NamedTuple):
@@ -81,6 +85,24 @@ def press_events(presses: Iterable[Press]) -> list[ButtonEvent]:
         ButtonEvent(time, Buttons(**{p.button: True for p in held if p.start <= time < p.end}))
         for time in times
     ]
+
+
+def probability(name: str, value: object) -> float:
+    """A number from 0 to 1.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    return within(name, value, 0.0, 1.0)
+
+
+def time_of_episode(name: str, value: object) -> float:
+    """A time [s] from 0 to `LONGEST_TIME`.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    return within(name, value, 0.0, LONGEST_TIME, "s")
 
 
 class Operator(Protocol):

@@ -7,7 +7,6 @@ arrays over the cranes.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from crane_env.observation import CraneState
 from crane_env.operators.base import EVENT_TOLERANCE, Buttons, Operator, ScheduledOperator
-from crane_env.operators.registry import OperatorSpec, make_operator
+from crane_env.operators.registry import OperatorSpec, make_operator, own_operator
 from crane_env.parameters import CraneParameters
 
 VectorOperatorSpec = OperatorSpec | Sequence[OperatorSpec]
@@ -42,21 +41,14 @@ def make_operators(spec: VectorOperatorSpec, count: int) -> list[Operator]:
                 f"A list of operators needs one for each of the {count} environments, "
                 f"not {len(given)}."
             )
-        return [_own(make_operator(one)) for one in given]
+        return [own_operator(one) for one in given]
     operator = make_operator(given)
-    return [_own(operator) for _ in range(count)]
+    return [own_operator(operator) for _ in range(count)]
 
 
 def _describes_an_operator(entry: object) -> bool:
     """Whether an entry of a list stands for an operator; events are tuples and have none of it."""
     return isinstance(entry, (str, Mapping)) or hasattr(entry, "events") or hasattr(entry, "press")
-
-
-def _own(operator: Operator) -> Operator:
-    """An operator that shares no state with the one given."""
-    if type(operator) is ScheduledOperator:
-        return ScheduledOperator(operator.program)
-    return copy.deepcopy(operator)
 
 
 class VectorOperator:

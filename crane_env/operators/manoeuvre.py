@@ -29,10 +29,23 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crane_env.observation import CraneState
-from crane_env.operators.base import ButtonEvent, Press, press_events
+from crane_env.operators.base import ButtonEvent, Press, press_events, probability, time_of_episode
 from crane_env.operators.dead_reckoning import hoist_axis, trolley_axis
 from crane_env.operators.table1 import HOIST_PRESS_DURATION, ManoeuvreTimes
 from crane_env.parameters import CraneParameters
+from crane_env.support.checks import not_negative
+from crane_env.support.fields import check_fields
+
+ORDER = (
+    ("travel_press_min", "travel_press_max"),
+    ("travel_press_max", "travel_release_min"),
+    ("travel_release_min", "travel_release_max"),
+    ("lift_press_min", "lift_press_max"),
+    ("lower_press_min", "lower_press_max"),
+)
+"""Times of a manoeuvre that come one before the other, or together."""
+
+TIMES = ("travel_press_delay", *sorted({name for pair in ORDER for name in pair}))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,32 +87,20 @@ class RandomManoeuvre:
 
     def __post_init__(self) -> None:
         """Refuses times that make no manoeuvre."""
-        for least, greatest in (
-            ("travel_press_min", "travel_press_max"),
-            ("travel_press_max", "travel_release_min"),
-            ("travel_release_min", "travel_release_max"),
-            ("lift_press_min", "lift_press_max"),
-            ("lower_press_min", "lower_press_max"),
-        ):
+        check_fields(self, time_of_episode, TIMES)
+        check_fields(self, not_negative, ("trolley_margin", "hoist_margin"))
+        check_fields(self, probability, ("backward_probability",))
+        for least, greatest in ORDER:
             low, high = getattr(self, least), getattr(self, greatest)
-            if not 0.0 <= low <= high < math.inf:
+            if low > high:
                 raise ValueError(
-                    f"A manoeuvre needs 0 <= {least} <= {greatest}, finite; got {low!r} and "
-                    f"{high!r} s."
+                    f"A manoeuvre needs {least} <= {greatest}; got {low} and {high} s."
                 )
         if self.lift_press_max + HOIST_PRESS_DURATION > self.lower_press_min:
             raise ValueError(
                 f"A manoeuvre lowers after its lift of {HOIST_PRESS_DURATION} s: lower_press_min "
                 f"({self.lower_press_min} s) must be at least lift_press_max "
                 f"({self.lift_press_max} s) plus {HOIST_PRESS_DURATION} s."
-            )
-        for name in ("travel_press_delay", "trolley_margin", "hoist_margin"):
-            value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise ValueError(f"{name} must be zero or a positive finite number, not {value!r}.")
-        if not 0.0 <= self.backward_probability <= 1.0:
-            raise ValueError(
-                f"backward_probability must be from 0 to 1, not {self.backward_probability!r}."
             )
 
     def draw(self, rng: np.random.Generator) -> ManoeuvreTimes:

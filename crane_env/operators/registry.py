@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
+import copy
 from collections.abc import Mapping, Sequence
-from numbers import Real
 from typing import Any
 
 from crane_env.operators.base import ButtonEvent, Operator, Program, ScheduledOperator
@@ -12,9 +11,14 @@ from crane_env.operators.manoeuvre import RandomManoeuvre
 from crane_env.operators.script import ButtonScript, read_script
 from crane_env.operators.semi_markov import RandomButtons
 from crane_env.operators.table1 import TABLE_1, Table1Manoeuvre
+from crane_env.support.checks import shown
+from crane_env.support.fields import with_fields
 
 OperatorSpec = str | Mapping[str, Any] | Program | Operator | Sequence[ButtonEvent]
 """What `make_operator` makes an operator of."""
+
+TABLE_1_NUMBERS = [str(number) for number in range(1, len(TABLE_1) + 1)]
+"""What may follow "table1:"."""
 
 VALID_NAMES = f"random, manoeuvre, table1:1 … table1:{len(TABLE_1)}, script:FILE"
 
@@ -51,8 +55,31 @@ def make_operator(spec: OperatorSpec) -> Operator:
             return ScheduledOperator(given)
     raise ValueError(
         f"An operator is a name ({VALID_NAMES}), a mapping with a name, a program, an operator or "
-        f"a sequence of button events, not {given!r}."
+        f"a sequence of button events, not {shown(given)}."
     )
+
+
+def own_operator(spec: OperatorSpec) -> Operator:
+    """Makes an operator that shares no state with the one given, nor with any other.
+
+    An operator is copied (`copy.deepcopy`), so that each environment has one of its own. One that
+    stands for something there is only one of, such as a real pendant, may define a `__deepcopy__`
+    that returns itself.
+
+    Raises:
+        ValueError: as `make_operator`, or an operator that cannot be copied.
+        FileNotFoundError: there is no such script.
+    """
+    operator = make_operator(spec)
+    if type(operator) is ScheduledOperator:
+        return ScheduledOperator(operator.program)
+    try:
+        return copy.deepcopy(operator)
+    except Exception as error:
+        raise ValueError(
+            f"Each environment needs an operator of its own, and {shown(operator)} cannot be "
+            f"copied: {error}."
+        ) from error
 
 
 def _program(name: object, fields: Mapping[str, Any]) -> Program:
@@ -62,41 +89,19 @@ def _program(name: object, fields: Mapping[str, Any]) -> Program:
             program = RandomButtons()
         case "manoeuvre", "", "":
             program = RandomManoeuvre()
-        case "table1", ":", number if number in _TABLE_1_NUMBERS:
+        case "table1", ":", number if number in TABLE_1_NUMBERS:
             program = Table1Manoeuvre(int(number))
         case "script", _, _ if "schedule" in fields:  # need not be read any more
             program = ButtonScript((), str(name))
         case "script", ":", file if file:
             program = read_script(file)
         case _:
-            raise ValueError(f"Unknown operator {name!r}; valid: {VALID_NAMES}.")
-    restored: Program = _with_fields(program, fields, str(name))
+            raise ValueError(f"Unknown operator {shown(name)}; valid: {VALID_NAMES}.")
+    restored: Program = with_fields(
+        program, fields, must_be="Fields must be a mapping", unknown=f"{str(name)!r} field"
+    )
     if restored.name != name:
-        raise ValueError(f"The fields of operator {name!r} are those of {restored.name!r}.")
+        raise ValueError(
+            f"The fields of operator {shown(name)} are those of {shown(restored.name)}."
+        )
     return restored
-
-
-_TABLE_1_NUMBERS = [str(number) for number in range(1, len(TABLE_1) + 1)]
-
-
-def _with_fields(settings: Any, fields: Mapping[str, Any], where: str) -> Any:
-    """A frozen dataclass with some fields replaced; mappings for those that are dataclasses."""
-    names = [field.name for field in dataclasses.fields(settings) if field.init]
-    changes: dict[str, Any] = {}
-    for name, value in fields.items():
-        if name not in names:
-            raise ValueError(
-                f"Operator {where!r} has no field {name!r}; valid: {', '.join(names)}."
-            )
-        present = getattr(settings, name)
-        if dataclasses.is_dataclass(present) and isinstance(value, Mapping):
-            changes[name] = _with_fields(present, value, f"{where}, {name}")
-        elif isinstance(present, float) and (
-            isinstance(value, bool) or not isinstance(value, Real)
-        ):
-            raise ValueError(f"Operator {where!r}: {name} must be a number, not {value!r}.")
-        elif dataclasses.is_dataclass(present) and not isinstance(value, type(present)):
-            raise ValueError(f"Operator {where!r}: {name} must be a mapping, not {value!r}.")
-        else:
-            changes[name] = value
-    return dataclasses.replace(settings, **changes)

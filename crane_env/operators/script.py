@@ -5,8 +5,9 @@ one nothing is pressed. Times are in seconds from the episode's start, finite, a
 order; of events at the same time the last one counts.
 
 A CSV file begins with a header: `time` and any of `forward`, `backward`, `up`, `down`, in any
-order; a button without a column is never pressed. Pressed is 1, released 0. Empty lines and lines
-that begin with `#` are skipped.
+order; a button without a column is never pressed. Pressed is 1 or true, released 0 or false. Empty
+lines and lines that begin with `#` are skipped. Columns may be separated by semicolons or tabs
+instead, and times have a decimal comma then.
 
     # travel forward, lift on the way
     time,forward,up
@@ -30,10 +31,9 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
-from collections.abc import Callable, Iterable, Iterator
+import stat
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from numbers import Real
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,6 +42,23 @@ import numpy as np
 from crane_env.observation import CraneState
 from crane_env.operators.base import RELEASED, ButtonEvent, Buttons
 from crane_env.parameters import CraneParameters
+from crane_env.support.atomic_file import atomic_file
+from crane_env.support.checks import not_negative, shown
+
+ENDINGS = (".csv", ".json")
+"""Of the files that are scripts."""
+
+LARGEST_FILE = 1_000_000
+"""A script's file may have so many bytes: some 50,000 events."""
+
+MOST_EVENTS = 100_000
+"""A script may have so many events."""
+
+HEADER = f"it names time and any of {', '.join(Buttons._fields)}, each once"
+"""What the first line of a CSV file does."""
+
+HELD = {"1": True, "true": True, "0": False, "false": False}
+"""How a CSV file says whether a button is pressed."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +79,10 @@ class ButtonScript:
 
     def __post_init__(self) -> None:
         """Brings the events into their form, or refuses them."""
-        if self.name.partition(":")[0] != "script":
-            raise ValueError(f"A script's name is 'script' or 'script:FILE', not {self.name!r}.")
+        if not isinstance(self.name, str) or self.name.partition(":")[0] != "script":
+            raise ValueError(
+                f"A script's name is 'script' or 'script:FILE', not {shown(self.name)}."
+            )
         object.__setattr__(self, "schedule", _schedule(_python_entries(self.schedule)))
 
     def events(
@@ -77,17 +96,16 @@ def read_script(path: str | Path) -> ButtonScript:
     """Reads a script; its events stay with it when the file goes.
 
     Args:
-        path: a file ending in .csv or .json.
+        path: a file ending in .csv or .json, of `LARGEST_FILE` bytes at most.
 
     Raises:
         FileNotFoundError: there is no such file.
-        ValueError: another ending, or a malformed script; the message gives file, place and reason.
+        ValueError: another ending, a device, pipe or folder, a file that is too large or cannot be
+            read, or a malformed script; the message gives file, place and reason.
     """
     file = Path(path)
-    entries = _format(file).entries
-    if not file.exists():
-        raise FileNotFoundError(f"There is no button script {str(path)!r}.")
-    data = file.read_bytes()
+    entries = _csv_entries if _ending(file) == ".csv" else _json_entries
+    data = _content(file)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -101,14 +119,43 @@ def write_script(path: str | Path, schedule: Iterable[ButtonEvent]) -> None:
 
     Args:
         path: a file ending in .csv or .json; an existing one is replaced.
-        schedule: the events, in order of time and finitely many.
+        schedule: the events, in order of time.
 
     Raises:
         ValueError: another ending, or an event that a script cannot have.
+        OSError: the file cannot be written.
     """
     file = Path(path)
-    text = _format(file).text(ButtonScript(tuple(schedule)).schedule)
-    file.write_text(text, encoding="utf-8", newline="\n")
+    as_text = _csv_text if _ending(file) == ".csv" else _json_text
+    text = as_text(ButtonScript(schedule).schedule)  # type: ignore[arg-type]
+    with atomic_file(file) as partial:
+        partial.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _ending(file: Path) -> str:
+    ending = file.suffix.lower()
+    if ending not in ENDINGS:
+        raise ValueError(f"A button script ends in {' or '.join(ENDINGS)}; {shown(str(file))} not.")
+    return ending
+
+
+def _content(file: Path) -> bytes:
+    """All of a regular file that is no larger than a script may be."""
+    name = shown(str(file))
+    try:
+        mode = file.stat().st_mode
+    except (OSError, ValueError) as error:
+        raise FileNotFoundError(f"There is no button script {name}.") from error
+    if not stat.S_ISREG(mode):  # to open a pipe, or to read a device, might never end
+        raise ValueError(f"A button script is a regular file, which {name} is not.")
+    try:
+        with file.open("rb") as opened:
+            data = opened.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise ValueError(f"The button script {name} cannot be read: {error.strerror}.") from error
+    if len(data) > LARGEST_FILE:
+        raise ValueError(f"A button script has at most {LARGEST_FILE} bytes; {name} has more.")
+    return data
 
 
 class _Entry(NamedTuple):
@@ -122,26 +169,21 @@ class _Entry(NamedTuple):
 def _schedule(entries: Iterable[_Entry]) -> tuple[ButtonEvent, ...]:
     events: list[ButtonEvent] = []
     for where, time, buttons in entries:
-        if isinstance(time, bool) or not isinstance(time, Real):
-            raise ValueError(f"{where}: the time must be a number, not {time!r}.")
-        try:
-            seconds = float(time)
-        except OverflowError:
-            seconds = math.inf
-        if not 0.0 <= seconds < math.inf:
-            raise ValueError(f"{where}: the time must be finite and at least 0 s, not {time!r}.")
+        seconds = not_negative(f"{where}: the time [s]", time)
         if events and seconds < events[-1].time:
             raise ValueError(
                 f"{where}: the time {seconds!r} s comes before that of the entry before it, "
                 f"{events[-1].time!r} s."
             )
+        if len(events) == MOST_EVENTS:
+            raise ValueError(f"A button script has at most {MOST_EVENTS} events.")
         events.append(ButtonEvent(seconds, buttons))
     return tuple(events)
 
 
 def _python_entries(schedule: object) -> Iterator[_Entry]:
     if not isinstance(schedule, Iterable):
-        raise ValueError(f"A button script is a sequence of events, not {schedule!r}.")
+        raise ValueError(f"A button script is a sequence of events, not {shown(schedule)}.")
     for number, entry in enumerate(schedule, start=1):
         where = f"Button script, entry {number}"
         try:
@@ -150,18 +192,19 @@ def _python_entries(schedule: object) -> Iterator[_Entry]:
         except (TypeError, ValueError):
             raise ValueError(
                 f"{where}: must be a ButtonEvent or a pair of a time and four booleans "
-                f"({', '.join(Buttons._fields)}), not {entry!r}."
+                f"({', '.join(Buttons._fields)}), not {shown(entry)}."
             ) from None
         values = (forward, backward, up, down)
         if not all(
             isinstance(value, bool | int | np.bool_) and value in (0, 1) for value in values
         ):
-            raise ValueError(f"{where}: buttons must be booleans, not {pressed!r}.")
+            raise ValueError(f"{where}: buttons must be booleans, not {shown(pressed)}.")
         yield _Entry(where, time, Buttons(*map(bool, values)))
 
 
 def _csv_entries(text: str, name: str) -> Iterator[_Entry]:
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    delimiter = _delimiter(text)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     columns: list[str] = []
     while True:
         try:
@@ -179,34 +222,41 @@ def _csv_entries(text: str, name: str) -> Iterator[_Entry]:
             continue
         if len(cells) != len(columns):
             raise ValueError(
-                f"{where}: {len(columns)} values expected ({','.join(columns)}), got {len(cells)}."
+                f"{where}: {len(columns)} values expected ({delimiter.join(columns)}), got "
+                f"{len(cells)}; with decimal commas, separate columns by semicolons."
             )
         values = dict(zip(columns, cells, strict=True))
         time = values.pop("time")
         for button, value in values.items():
-            if value not in ("0", "1"):
-                raise ValueError(f"{where}: {button} must be 0 or 1, not {value!r}.")
-        buttons = RELEASED._replace(**{button: value == "1" for button, value in values.items()})
-        yield _Entry(where, _number(time), buttons)
+            if value.lower() not in HELD:
+                raise ValueError(
+                    f"{where}: {button} must be 0 or 1, false or true, not {shown(value)}."
+                )
+        buttons = RELEASED._replace(**{name: HELD[value.lower()] for name, value in values.items()})
+        yield _Entry(where, _number(time, "." if delimiter == "," else ","), buttons)
     if not columns:
-        raise ValueError(f"{name}, line 1: a header is missing; {_HEADER}.")
+        raise ValueError(f"{name}, line 1: a header is missing; {HEADER}.")
+
+
+def _delimiter(text: str) -> str:
+    """What separates the columns: of the header, the first line that says anything."""
+    lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
+    header = next(lines, "")
+    return next((mark for mark in ";\t" if mark in header), ",")
 
 
 def _csv_columns(cells: list[str], where: str) -> list[str]:
     unknown = sorted(set(cells) - {"time", *Buttons._fields})
     if "time" not in cells or unknown or len(set(cells)) < len(cells):
-        raise ValueError(f"{where}: not a header, {','.join(cells)!r}; {_HEADER}.")
+        raise ValueError(f"{where}: not a header, {shown(','.join(cells))}; {HEADER}.")
     return cells
 
 
-def _number(text: str) -> float | str:
+def _number(text: str, decimal_mark: str) -> float | str:
     try:
-        return float(text)
+        return float(text.replace(decimal_mark, "."))
     except ValueError:
         return text
-
-
-_HEADER = f"it names time and any of {', '.join(Buttons._fields)}, each once"
 
 
 def _csv_text(schedule: tuple[ButtonEvent, ...]) -> str:
@@ -230,12 +280,14 @@ def _json_entries(text: str, name: str) -> Iterator[_Entry]:
     for number, entry in enumerate(entries, start=1):
         where = f"{name}, entry {number}"
         if not isinstance(entry, dict) or set(entry) != {"time", "buttons"}:
-            raise ValueError(f"{where}: must have 'time' and 'buttons' and no more, not {entry!r}.")
+            raise ValueError(
+                f"{where}: must have 'time' and 'buttons' and no more, not {shown(entry)}."
+            )
         pressed = entry["buttons"]
         if not isinstance(pressed, list) or any(item not in Buttons._fields for item in pressed):
             raise ValueError(
                 f"{where}: buttons must be a list of any of {', '.join(Buttons._fields)}, "
-                f"not {pressed!r}."
+                f"not {shown(pressed)}."
             )
         yield _Entry(where, entry["time"], Buttons(**dict.fromkeys(pressed, True)))
 
@@ -246,22 +298,3 @@ def _json_text(schedule: tuple[ButtonEvent, ...]) -> str:
         for time, pressed in schedule
     ]
     return "[\n" + ",\n".join(f"  {json.dumps(entry)}" for entry in entries) + "\n]\n"
-
-
-class _Format(NamedTuple):
-    """A file format: entries of a text (and the file's name, for messages), text of a schedule."""
-
-    entries: Callable[[str, str], Iterator[_Entry]]
-    text: Callable[[tuple[ButtonEvent, ...]], str]
-
-
-_FORMATS = {".csv": _Format(_csv_entries, _csv_text), ".json": _Format(_json_entries, _json_text)}
-
-
-def _format(file: Path) -> _Format:
-    ending = file.suffix.lower()
-    if ending not in _FORMATS:
-        raise ValueError(
-            f"A button script ends in {' or '.join(_FORMATS)}; {str(file)!r} does not."
-        )
-    return _FORMATS[ending]

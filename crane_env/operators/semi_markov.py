@@ -45,12 +45,31 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crane_env.observation import CraneState
-from crane_env.operators.base import ButtonEvent, Buttons
+from crane_env.operators.base import ButtonEvent, Buttons, probability, time_of_episode
 from crane_env.operators.dead_reckoning import Axis, hoist_axis, trolley_axis
 from crane_env.parameters import CraneParameters
+from crane_env.support.checks import not_negative, positive, shown, within
+from crane_env.support.fields import check_fields
 
 FULL_ROOM_SHARE = 0.5
 """Share of a drawn press that must fit before a limit, or else the opposite is considered."""
+
+STEP_ROUNDING = 1e-9
+"""A press may lack this share of a control period: rounding of the division by it."""
+
+MAX_SPREAD = 5.0
+"""Widest spread of a log-normal dwell time: one standard deviation is a factor of 148."""
+
+PROBABILITIES = (
+    "direct_reversal_probability",
+    "same_direction_probability",
+    "pulse_after_long",
+    "pulse_after_pulse",
+    "slip_probability",
+)
+POSITIVE = ("long_median", "pause_median", "pulse_pause_median", "pulse_min", "slip_min")
+TIMES = (*POSITIVE, "pulse_max", "slip_max")
+SPREADS = ("long_spread", "pause_spread", "pulse_pause_spread")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +95,8 @@ class ButtonHabits:
         limit_margin: nominal distance kept from the axis's limit switches [m].
 
     Raises:
-        ValueError: a probability outside 0 to 1, or a time that is not positive and finite.
+        ValueError: a probability outside 0 to 1, a time that is not positive or longer than
+            `LONGEST_TIME`, or a spread beyond `MAX_SPREAD`.
     """
 
     direct_reversal_probability: float = 0.12
@@ -98,28 +118,15 @@ class ButtonHabits:
 
     def __post_init__(self) -> None:
         """Refuses habits that no thumb can have."""
-        for name in (
-            "direct_reversal_probability",
-            "same_direction_probability",
-            "pulse_after_long",
-            "pulse_after_pulse",
-            "slip_probability",
-        ):
-            value = getattr(self, name)
-            if not 0.0 <= value <= 1.0:
-                raise ValueError(f"{name} must be from 0 to 1, not {value!r}.")
-        for name in ("long_median", "pause_median", "pulse_pause_median", "pulse_min", "slip_min"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ValueError(f"{name} must be a positive finite time in s, not {value!r}.")
-        for name in ("long_spread", "pause_spread", "pulse_pause_spread", "limit_margin"):
-            value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise ValueError(f"{name} must be zero or a positive finite number, not {value!r}.")
+        check_fields(self, probability, PROBABILITIES)
+        check_fields(self, time_of_episode, TIMES)
+        check_fields(self, positive, POSITIVE)
+        check_fields(self, lambda name, value: within(name, value, 0.0, MAX_SPREAD), SPREADS)
+        check_fields(self, not_negative, ("limit_margin",))
         for least, greatest in (("pulse_min", "pulse_max"), ("slip_min", "slip_max")):
             low, high = getattr(self, least), getattr(self, greatest)
-            if not low <= high < math.inf:
-                raise ValueError(f"{greatest} ({high!r} s) must be at least {least} ({low!r} s).")
+            if low > high:
+                raise ValueError(f"{greatest} ({high} s) must be at least {least} ({low} s).")
 
 
 HOISTING = ButtonHabits(long_median=2.5, pause_median=2.5, limit_margin=0.1)
@@ -134,11 +141,20 @@ class RandomButtons:
         travel: habits on the forward and backward buttons.
         hoist: habits on the up and down buttons.
         name: "random".
+
+    Raises:
+        ValueError: something else in the place of habits.
     """
 
     travel: ButtonHabits = ButtonHabits()
     hoist: ButtonHabits = HOISTING
     name: str = field(init=False, default="random")
+
+    def __post_init__(self) -> None:
+        """Refuses what are no habits."""
+        for thumb in (self.travel, self.hoist):
+            if not isinstance(thumb, ButtonHabits):
+                raise ValueError(f"A thumb has ButtonHabits, not {shown(thumb)}.")
 
     def events(
         self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters
@@ -298,9 +314,8 @@ class _Thumb:
 
     def _room(self, direction: int) -> int:
         """Control steps for which the direction may be pressed from now on."""
-        # The tolerance keeps a step that rounding of the division would take away.
         longest = self._axis.longest_press(self._position, self._rate, direction)
-        return math.floor(longest / self._period + 1e-9)
+        return math.floor(longest / self._period + STEP_ROUNDING)
 
     def _steps(self, seconds: float) -> int:
         return max(round(seconds / self._period), 1)

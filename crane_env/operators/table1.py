@@ -16,6 +16,7 @@ import numpy as np
 from crane_env.observation import CraneState
 from crane_env.operators.base import ButtonEvent, Press, press_events
 from crane_env.parameters import CraneParameters
+from crane_env.support.checks import whole
 
 HOIST_PRESS_DURATION = 4.0
 """How long the up button, and later the down button, is held [s]."""
@@ -71,12 +72,9 @@ class Table1Manoeuvre:
 
     def __post_init__(self) -> None:
         """Refuses a manoeuvre that the table does not have."""
-        whole = isinstance(self.number, int) and not isinstance(self.number, bool)
-        if not whole or not 1 <= self.number <= len(TABLE_1):
-            raise ValueError(
-                f"Table I has the manoeuvres 1 to {len(TABLE_1)}, not {self.number!r}."
-            )
-        object.__setattr__(self, "name", f"table1:{self.number}")
+        number = whole("A manoeuvre of Table I", self.number, least=1, below=len(TABLE_1) + 1)
+        object.__setattr__(self, "number", number)
+        object.__setattr__(self, "name", f"table1:{number}")
 
     def events(
         self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters

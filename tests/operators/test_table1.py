@@ -73,5 +73,7 @@ def test_the_manoeuvre_is_the_same_on_any_crane_and_under_any_seed() -> None:
 
 @pytest.mark.parametrize("number", [0, 11, -1, 2.0, True, "3"])
 def test_a_manoeuvre_that_the_table_does_not_have_is_refused(number: object) -> None:
-    with pytest.raises(ValueError, match="Table I has the manoeuvres 1 to 10, not"):
+    with pytest.raises(
+        ValueError, match="of Table I must be a whole number of at least 1 and below 11"
+    ):
         Table1Manoeuvre(number)  # type: ignore[arg-type]
