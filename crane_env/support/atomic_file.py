@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import secrets
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,21 +12,60 @@ from pathlib import Path
 PARTIAL_SUFFIX = ".partial"
 """Ending of files that are being written; one that stays behind belongs to a killed process."""
 
+LONGEST_STEM = 40
+"""So many characters of the target's name are in that of its partial file."""
+
+NEW_FILE_MODE = 0o666
+"""Permissions of a file that was not there before, less the umask."""
+
 
 @contextmanager
 def atomic_file(target: str | os.PathLike[str]) -> Iterator[Path]:
-    """Gives a temporary path that becomes `target` if the block ends well, and goes otherwise.
+    """Gives the path of an empty file that becomes `target` if the block ends well, or goes.
+
+    The empty file is new, its name cannot be guessed, and no link is followed: what others plant in
+    the folder is not written to. The target is on the disk when the block has ended, not only in
+    memory.
 
     Args:
-        target: the file to be written; an existing one is replaced in one step.
+        target: the file to be written; an existing one, or a link, is replaced in one step, and the
+            new file has its permissions.
 
     Raises:
         OSError: the file cannot be written.
     """
     path = Path(target)
-    partial = path.with_name(f".{path.name}.{os.getpid()}{PARTIAL_SUFFIX}")
+    stem = path.name[:LONGEST_STEM]
+    partial = path.with_name(f".{stem}.{secrets.token_hex(8)}{PARTIAL_SUFFIX}")
+    only_new = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0)
+    descriptor = os.open(partial, only_new, NEW_FILE_MODE)
     try:
-        yield partial
+        try:
+            _keep_mode(path, descriptor)
+            yield partial
+            os.fsync(descriptor)  # what the block wrote by the file's name is in the same file
+        finally:
+            os.close(descriptor)
         partial.replace(path)
+        _sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def _keep_mode(path: Path, descriptor: int) -> None:
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return
+    if stat.S_ISREG(mode) and hasattr(os, "fchmod"):
+        os.fchmod(descriptor, stat.S_IMODE(mode))
+
+
+def _sync_folder(folder: Path) -> None:
+    """Makes a change of name durable, where the system can."""
+    if hasattr(os, "O_DIRECTORY"):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
