@@ -14,16 +14,42 @@ from numpy.typing import NDArray
 from crane_env.episode.metrics import Metrics, after_release, integral_absolute_error
 from crane_env.parameters import CraneParameters
 from crane_env.support.atomic_file import atomic_file
+from crane_env.support.checks import whole
 from crane_env.support.extras import require
 
-FORMAT = "oilcrane-trajectory-1"
+FORMAT = "oilcrane-trajectory-2"
 """Version of the Parquet layout."""
+
+UNITS = {
+    "time": "s",
+    "trolley_position": "m",
+    "trolley_velocity": "m/s",
+    "cable_length": "m",
+    "cable_rate": "m/s",
+    "sway_angle": "rad",
+    "sway_rate": "rad/s",
+    "travel_reference": "m/s",
+    "hoist_reference": "m/s",
+    "payload_position": "m",
+    "payload_velocity": "m/s",
+    "cable_tension": "N",
+    "action": "m/s^2",
+    "acceleration": "m/s^2",
+    "action_clipped": "",
+    "drive_limited": "",
+    "reward": "m^2/s",
+    "reward_tracking": "m^2/s",
+    "reward_sway": "m^2/s",
+    "reward_acceleration": "m^2/s",
+    "act_time": "s",
+}
+"""Unit of each column, in order; those without one are booleans."""
 
 SPEED_TOLERANCE = 0.02
 """The trolley may exceed its setpoint by this much while its drive settles [m/s]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """Record of an episode, one row a control period: where the crane was, what it did and earned.
 
@@ -84,9 +110,29 @@ class Trajectory:
     solver_failures: int = 0
     simulation_failed: bool = False
 
+    def __post_init__(self) -> None:
+        """Refuses what is no record."""
+        rows = np.shape(self.time)
+        for name, values in self.columns().items():
+            kind = np.dtype(np.float64 if UNITS[name] else np.bool_)
+            if not isinstance(values, np.ndarray) or (values.dtype, values.shape) != (kind, rows):
+                raise ValueError(
+                    f"Column {name!r} of a trajectory must be an array of {kind} of shape {rows}."
+                )
+        if len(rows) != 1 or not rows[0]:
+            raise ValueError("A trajectory has one or more rows.")
+
     def __len__(self) -> int:
-        """Number of control steps."""
+        """Number of control periods."""
         return len(self.time)
+
+    def __repr__(self) -> str:
+        """One short line."""
+        failed = ", simulation failed" if self.simulation_failed else ""
+        return (
+            f"<Trajectory of {len(self)} control periods, "
+            f"{len(self) * self.parameters.control_period:.6g} s{failed}>"
+        )
 
     def metrics(self) -> Metrics:
         """Indices of the episode; see `crane_env.episode.metrics`."""
@@ -94,11 +140,20 @@ class Trajectory:
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Arrays by name, in order of declaration."""
-        values = ((field.name, getattr(self, field.name)) for field in dataclasses.fields(self))
-        return {name: value for name, value in values if isinstance(value, np.ndarray)}
+        return {name: getattr(self, name) for name in UNITS}
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame` of the columns, one row a control period, SI units.
+
+        Raises:
+            ImportError: pandas is missing; the message names the extra.
+        """
+        return require("pandas", extra="results").DataFrame(self.columns())
 
     def to_parquet(self, path: str | os.PathLike[str]) -> None:
         """Writes the trajectory; the file appears whole or not at all.
+
+        Each column's metadata have its `unit`.
 
         Raises:
             ImportError: pyarrow is missing; the message names the extra.
@@ -109,12 +164,20 @@ class Trajectory:
         metadata = {
             "format": FORMAT,
             "parameters": json.dumps(dataclasses.asdict(self.parameters)),
-            "solver_failures": str(self.solver_failures),
+            "solver_failures": json.dumps(self.solver_failures),
             "simulation_failed": json.dumps(self.simulation_failed),
         }
-        table = pyarrow.table(self.columns()).replace_schema_metadata(metadata)
+        columns = {name: pyarrow.array(values) for name, values in self.columns().items()}
+        schema = pyarrow.schema(
+            [
+                pyarrow.field(name, values.type, metadata={"unit": UNITS[name]})
+                for name, values in columns.items()
+            ],
+            metadata=metadata,
+        )
         with atomic_file(path) as partial:
-            parquet.write_table(table, partial)
+            table = pyarrow.table(columns, schema=schema)
+            parquet.write_table(table, partial, write_page_checksum=True)
 
     @classmethod
     def from_parquet(cls, path: str | os.PathLike[str]) -> Trajectory:
@@ -122,28 +185,46 @@ class Trajectory:
 
         Raises:
             ImportError: pyarrow is missing; the message names the extra.
-            ValueError: the file is no trajectory of this version.
+            FileNotFoundError: there is no such file.
+            ValueError: the file is no whole trajectory of this version; the message says why.
         """
         pyarrow = require("pyarrow", extra="results")
         parquet = require("pyarrow.parquet", extra="results")
-        try:
-            table = parquet.read_table(path)
-        except pyarrow.ArrowInvalid as error:
-            raise ValueError(f"{os.fspath(path)} is not a Parquet file: {error}") from error
+        name = os.fspath(path)
+        with open(path, "rb") as file:  # noqa: PTH123  a path may be of any kind
+            try:
+                table = parquet.read_table(file, page_checksum_verification=True)
+            except (pyarrow.ArrowException, OSError) as error:
+                raise ValueError(
+                    f"{name} is not a Parquet file, or not a whole one: {error}"
+                ) from error
         metadata = {
-            key.decode(): value.decode() for key, value in (table.schema.metadata or {}).items()
+            key.decode(errors="replace"): value
+            for key, value in (table.schema.metadata or {}).items()
         }
-        if metadata.get("format") != FORMAT:
-            raise ValueError(
-                f"{os.fspath(path)} is not a trajectory of format {FORMAT!r} "
-                f"(found {metadata.get('format')!r})."
+        found = metadata.get("format", b"").decode(errors="replace")
+        if found != FORMAT:
+            known = found.startswith(FORMAT.rstrip("0123456789"))
+            advice = (
+                "; another version of oilcrane wrote it: play the episode again" if known else ""
             )
-        return cls(
-            **{name: table[name].to_numpy() for name in table.column_names},
-            parameters=CraneParameters.of(json.loads(metadata["parameters"])),
-            solver_failures=int(metadata["solver_failures"]),
-            simulation_failed=metadata.get("simulation_failed") == "true",
-        )
+            raise ValueError(
+                f"{name} is not a trajectory of format {FORMAT!r}, but {found!r}{advice}."
+            )
+        wrong = sorted(set(UNITS) ^ set(table.column_names))
+        if wrong or table.num_columns != len(UNITS):
+            raise ValueError(
+                f"{name} has not the columns of a trajectory; missing or too many: {wrong}."
+            )
+        try:
+            return cls(
+                **{column: table[column].to_numpy() for column in UNITS},
+                parameters=CraneParameters.of(json.loads(metadata["parameters"])),
+                solver_failures=whole("solver_failures", json.loads(metadata["solver_failures"])),
+                simulation_failed=json.loads(metadata["simulation_failed"]) is True,
+            )
+        except (KeyError, ValueError) as error:
+            raise ValueError(f"{name} is not a whole trajectory: {error}") from error
 
 
 def measure(trajectory: Trajectory) -> Metrics:

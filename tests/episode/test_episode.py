@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from crane_env import CraneParameters, Observation, Trajectory, run_episode
@@ -55,28 +59,118 @@ def test_a_trajectory_records_what_the_controller_saw_and_did() -> None:
             assert info["payload_velocity"] == record.payload_velocity[k + 1]
 
 
-def test_parquet_gives_the_trajectory_back_bit_for_bit(tmp_path: Path) -> None:
+def test_parquet_gives_the_trajectory_back_bit_for_bit_and_says_its_units(tmp_path: Path) -> None:
+    import pyarrow.parquet
+
     record = trajectory(parameters=CraneParameters(payload_mass=150.0))
+    record = dataclasses.replace(record, solver_failures=3, simulation_failed=True)
     record.to_parquet(tmp_path / "episode.parquet")
     again = Trajectory.from_parquet(tmp_path / "episode.parquet")
     assert again.parameters == record.parameters
-    assert again.solver_failures == record.solver_failures
+    assert (again.solver_failures, again.simulation_failed) == (3, True)
     for name, column in record.columns().items():
         assert again.columns()[name].dtype == column.dtype
-        assert again.columns()[name].tolist() == column.tolist()
+        assert again.columns()[name].tobytes() == column.tobytes()
     assert [p.name for p in tmp_path.iterdir()] == ["episode.parquet"]
+    schema = pyarrow.parquet.read_schema(tmp_path / "episode.parquet")
+    assert schema.field("cable_tension").metadata[b"unit"] == b"N"
 
 
-def test_files_that_are_no_trajectory_are_refused(tmp_path: Path) -> None:
-    import pyarrow
+def test_a_trajectory_has_a_short_name_and_a_data_frame() -> None:
+    record = trajectory()
+    assert repr(record) == "<Trajectory of 1250 control periods, 25 s>"
+    failed = dataclasses.replace(record, simulation_failed=True)
+    assert repr(failed).endswith("25 s, simulation failed>")
+    frame = record.to_pandas()
+    assert list(frame.columns) == list(record.columns())
+    assert frame["sway_angle"].to_numpy().tolist() == record.sway_angle.tolist()
+    arrays = [f.name for f in dataclasses.fields(record) if "NDArray" in str(f.type)]
+    assert arrays == list(record.columns())
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file that is a trajectory."""
+    path = tmp_path_factory.mktemp("kept") / "episode.parquet"
+    trajectory().to_parquet(path)
+    return path
+
+
+def without_rows(table: Any) -> Any:
+    return table.slice(0, 0)
+
+
+def without_a_column(table: Any) -> Any:
+    return table.drop_columns(["sway_rate"])
+
+
+def with_a_column(table: Any) -> Any:
+    return table.append_column("more", table["time"])
+
+
+def of_other_types(table: Any) -> Any:
+    return table.set_column(5, "sway_angle", table["action_clipped"])
+
+
+def without_metadata(table: Any) -> Any:
+    return table.replace_schema_metadata({"format": table.schema.metadata[b"format"]})
+
+
+def of_the_format_before(table: Any) -> Any:
+    return table.replace_schema_metadata({"format": "oilcrane-trajectory-1"})
+
+
+def of_something_else(table: Any) -> Any:
+    return table.replace_schema_metadata({})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (without_rows, "has one or more rows"),
+        (without_a_column, r"has not the columns .*\['sway_rate'\]"),
+        (with_a_column, r"has not the columns .*\['more'\]"),
+        (of_other_types, "'sway_angle' of a trajectory must be an array of float64"),
+        (without_metadata, "is not a whole trajectory: 'parameters'"),
+        (of_the_format_before, "another version of oilcrane wrote it: play the episode again"),
+        (of_something_else, "is not a trajectory of format 'oilcrane-trajectory-2'"),
+    ],
+)
+def test_a_table_that_is_no_trajectory_is_refused_with_the_reason(
+    tmp_path: Path, kept: Path, change: Callable[[Any], Any], message: str
+) -> None:
     import pyarrow.parquet
 
-    (tmp_path / "text").write_text("time,action")
-    with pytest.raises(ValueError, match="is not a Parquet file"):
-        Trajectory.from_parquet(tmp_path / "text")
-    pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), tmp_path / "other")
-    with pytest.raises(ValueError, match="is not a trajectory of format 'oilcrane-trajectory-1'"):
-        Trajectory.from_parquet(tmp_path / "other")
+    other = tmp_path / "other.parquet"
+    pyarrow.parquet.write_table(change(pyarrow.parquet.read_table(kept)), other)
+    with pytest.raises(ValueError, match=message):
+        Trajectory.from_parquet(other)
+
+
+@given(st.data())
+@settings(deadline=None)
+def test_a_file_that_was_damaged_is_never_taken_for_a_trajectory(kept: Path, data: Any) -> None:
+    whole = kept.read_bytes()
+    place = data.draw(st.integers(0, len(whole) - 1))
+    damaged = data.draw(
+        st.sampled_from(
+            [
+                whole[:place],
+                whole[:place] + bytes([whole[place] ^ 255]) + whole[place + 1 :],
+                whole[:place] + bytes(64) + whole[place + 64 :],
+            ]
+        )
+    )
+    path = kept.with_name("damaged.parquet")
+    path.write_bytes(damaged)
+    try:
+        found = Trajectory.from_parquet(path)
+    except ValueError:
+        return
+    expected = Trajectory.from_parquet(kept)
+    for name, column in expected.columns().items():
+        assert found.columns()[name].tobytes() == column.tobytes()
+    assert found.metrics() == expected.metrics()
 
 
 def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
