@@ -88,7 +88,7 @@ class StageCost:
         else:
             sway = sway_angle - travel_reference
         return CostTerms(
-            tracking=(payload_velocity - travel_reference) ** 2,
-            sway=self.sway_weight * sway**2,
-            acceleration=self.acceleration_weight * acceleration**2,
+            (payload_velocity - travel_reference) ** 2,
+            self.sway_weight * sway**2,
+            self.acceleration_weight * acceleration**2,
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium
 import numpy as np
@@ -12,39 +12,17 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from crane_env.environment.options import check_names, start_of
-from crane_env.kinematics import payload_position, payload_velocity
+from crane_env.environment.pictures import Pictures
+from crane_env.environment.report import StepRecord, report_period, report_start
 from crane_env.observation import CraneState, Observation, observation_space
-from crane_env.operators.base import RELEASED
+from crane_env.operators.base import RELEASED, Buttons
 from crane_env.operators.registry import OperatorSpec, make_operator
 from crane_env.parameters import CraneParameters
-from crane_env.plant.single import Plant, SimulationDivergedError
+from crane_env.plant.single import Plant
 from crane_env.stage_cost import StageCost
 
 if TYPE_CHECKING:
     from crane_env.rendering.scene import CraneRenderer
-
-ACTION_ROUNDING = 1e-6
-"""Share of the limit by which an action may exceed it by rounding to float32."""
-
-
-class StepRecord(NamedTuple):
-    """The plant's own truth after one control period or a reset, which no wrapper has touched.
-
-    Floats of one crane, arrays of shape (N,) of many.
-
-    Attributes:
-        time: since the reset [s].
-        observation: state of the plant and the references now in force.
-        info: as `reset` or `step` returns it; a copy.
-        action: trolley acceleration that was asked for [m/s^2], before any clipping; nan at reset.
-        reward: [m^2/s]; 0 at reset.
-    """
-
-    time: Any
-    observation: Observation
-    info: dict[str, Any]
-    action: Any
-    reward: Any
 
 
 class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
@@ -92,16 +70,20 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
 
     ## Info
 
-    | key                 | unit   | meaning                                            |
-    |---------------------|--------|----------------------------------------------------|
-    | payload_position    | m      | s + l sin(theta)                                   |
-    | payload_velocity    | m/s    | s' + l theta' cos(theta) + l' sin(theta)           |
-    | cable_tension       | N      | 0 when slack                                       |
-    | buttons             | -      | `Buttons` as pressed                               |
-    | acceleration        | m/s^2  | what the drive did (`step` only)                   |
-    | action_clipped      | -      | the action was beyond the limits (`step` only)     |
-    | drive_limited       | -      | speed limit or limit switch overruled the action   |
-    | reward_tracking ... | m^2/s  | the three terms of the reward (`step` only)        |
+    The same keys after `reset` as after `step`; numbers are NumPy scalars, flags and buttons arrays
+    of bool, of shape () and (4,).
+
+    | key                 | unit   | meaning                                            | at reset |
+    |---------------------|--------|----------------------------------------------------|----------|
+    | payload_position    | m      | s + l sin(theta)                                   |          |
+    | payload_velocity    | m/s    | s' + l theta' cos(theta) + l' sin(theta)           |          |
+    | cable_tension       | N      | 0 when slack                                       |          |
+    | buttons             | -      | as pressed, in the order of `Buttons`              |          |
+    | acceleration        | m/s^2  | what the drive did                                 | 0        |
+    | action_clipped      | -      | the action was beyond the limits                   | False    |
+    | drive_limited       | -      | speed limit or limit switch overruled the action   | False    |
+    | simulation_failed   | -      | the simulation diverged, see below                 | False    |
+    | reward_tracking ... | m^2/s  | the three terms of the reward                      | 0        |
 
     ## Starting state
 
@@ -111,7 +93,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     ## Episode end
 
     Never terminates; truncated after 1250 steps (25 s) when made by `gymnasium.make`. Should the
-    simulation ever diverge, the crane stays where it was, the episode is truncated and `info` has
+    simulation ever diverge, the crane stays where it was, the episode is truncated and `info` says
     `simulation_failed`.
 
     ## Truth behind wrappers
@@ -149,17 +131,12 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         render_width: int = 960,
         render_height: int = 720,
     ) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(
-                f"Unknown render_mode {render_mode!r}; valid: None, "
-                f"{', '.join(self.metadata['render_modes'])}."
-            )
+        modes = self.metadata["render_modes"]
+        self._pictures = Pictures(render_mode, modes, render_width, render_height)
+        self.render_mode = render_mode
         self.parameters = CraneParameters.of(parameters)
         self.cost = StageCost.of(cost)
         self.plant = Plant(self.parameters)
-        self.render_mode = render_mode
-        self.render_width = render_width
-        self.render_height = render_height
         frames = round(1.0 / self.parameters.control_period)
         self.metadata = {**self.metadata, "render_fps": frames}
         limit = self.parameters.acceleration_max
@@ -168,9 +145,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         self._default_operator = make_operator(operator)
         self._operator = self._default_operator
         self._step_index = 0
-        self._buttons = RELEASED
-        self._references = (0.0, 0.0)
-        self._renderer: CraneRenderer | None = None
+        self._press(RELEASED)
         self.recorder: Callable[[StepRecord], None] | None = None
 
     @property
@@ -205,18 +180,14 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         self.plant.reset(start)
         self._operator = operator
         self._step_index = 0
-        state = self.plant.state()
+        state, tension = self.plant.measure()
         # The operator draws from a generator of its own: how far one episode was played does not
         # change the next.
         stream = np.random.default_rng(int(self.np_random.integers(2**63)))
         self._operator.reset(stream, state, self.parameters)
         self._read_buttons(state)
-        info = self._info(state)
-        if self.render_mode == "human":
-            self.render()
-        if self.recorder is not None:
-            self.recorder(StepRecord(self.time, self.truth(), dict(info), math.nan, 0.0))
-        return self._observation(state), info
+        info = report_start(state, tension)
+        return self._show(state, info, math.nan, 0.0), info
 
     def step(
         self, action: NDArray[Any]
@@ -231,41 +202,14 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         """
         asked = self._checked(action)
         limit = self.parameters.acceleration_max
-        command = min(max(asked, -limit), limit)
         travel_reference, hoist_reference = self._references
-        diverged = False
-        try:
-            drive = self.plant.step(command, hoist_reference)
-        except SimulationDivergedError as error:
-            drive, diverged = error.drive, True
+        outcome = self.plant.step(min(max(asked, -limit), limit), hoist_reference)
         self._step_index += 1
-        state = self.plant.state()
-        if not diverged:
-            self._read_buttons(state)
-        info = self._info(state)
-        tracking, sway, effort = self.cost.terms(
-            info["payload_velocity"],
-            travel_reference,
-            state.cable_length,
-            state.sway_angle,
-            drive.acceleration,
-        )
-        period = self.parameters.control_period
-        tracking, sway, effort = -period * tracking, -period * sway, -period * effort
-        info["acceleration"] = drive.acceleration
-        info["action_clipped"] = abs(asked - command) > ACTION_ROUNDING * limit
-        info["drive_limited"] = drive.limited
-        info["reward_tracking"] = tracking
-        info["reward_sway"] = sway
-        info["reward_acceleration"] = effort
-        if diverged:
-            info["simulation_failed"] = True
-        if self.render_mode == "human":
-            self.render()
-        reward = tracking + sway + effort
-        if self.recorder is not None:
-            self.recorder(StepRecord(self.time, self.truth(), dict(info), asked, reward))
-        return self._observation(state), reward, False, diverged, info
+        if not outcome.failed:
+            self._read_buttons(outcome.state)
+        reward, info = report_period(outcome, asked, travel_reference, self.parameters, self.cost)
+        observation = self._show(outcome.state, info, asked, reward)
+        return observation, reward, False, outcome.failed, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draws the crane, the pendant, and reference and payload velocity.
@@ -276,31 +220,24 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         Raises:
             RuntimeError: no OpenGL back end; the message says what to set and install.
         """
-        if self.render_mode is None:
-            gymnasium.logger.warn(
-                'render() without a render_mode; use gymnasium.make(..., render_mode="rgb_array").'
-            )
-            return None
-        if self._renderer is None:
-            from crane_env.rendering.scene import CraneRenderer
+        return cast(
+            "NDArray[np.uint8] | None",
+            self._pictures.draw(self._make_renderer, self._buttons, self._references[0]),
+        )
 
-            self._renderer = CraneRenderer(
-                self.plant,
-                width=self.render_width,
-                height=self.render_height,
-                window=self.render_mode == "human",
-            )
-        return self._renderer.draw(self._buttons, self._references[0])
+    def _make_renderer(self) -> CraneRenderer:
+        from crane_env.rendering.scene import CraneRenderer
+
+        size, window = self._pictures.size, self.render_mode == "human"
+        return CraneRenderer(self.plant, *size, window=window)
 
     def close(self) -> None:
         """Closes the window and frees the graphics memory."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        self._pictures.close()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but graphics and recorder: a copy continues bit for bit, draws for itself."""
-        return {**self.__dict__, "_renderer": None, "recorder": None}
+        """Everything but the recorder: a copy continues bit for bit and draws for itself."""
+        return {**self.__dict__, "recorder": None}
 
     def _checked(self, action: NDArray[Any]) -> float:
         array = np.asarray(action)
@@ -315,24 +252,21 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         time = self._step_index * self.parameters.control_period
         buttons = self._operator.press(time, state)
         if buttons is not self._buttons:
-            self._buttons = buttons
-            self._references = buttons.references(self.parameters)
+            self._press(buttons)
 
-    def _observation(self, state: CraneState) -> NDArray[np.float64]:
+    def _press(self, buttons: Buttons) -> None:
+        self._buttons = buttons
+        self._references = buttons.references(self.parameters)
+        self._pressed = np.array(buttons, dtype=np.bool_)
+
+    def _show(
+        self, state: CraneState, info: dict[str, Any], asked: float, reward: float
+    ) -> NDArray[np.float64]:
+        """Completes the info, tells recorder and window, and makes the observation."""
+        info["buttons"] = self._pressed.copy()
+        if self.render_mode == "human":
+            self.render()
+        if self.recorder is not None:
+            truth = Observation(*state, *self._references)
+            self.recorder(StepRecord(self.time, truth, dict(info), asked, reward))
         return np.array((*state, *self._references))
-
-    def _info(self, state: CraneState) -> dict[str, Any]:
-        return {
-            "payload_position": payload_position(
-                state.trolley_position, state.cable_length, state.sway_angle
-            ),
-            "payload_velocity": payload_velocity(
-                state.trolley_velocity,
-                state.cable_length,
-                state.cable_rate,
-                state.sway_angle,
-                state.sway_rate,
-            ),
-            "cable_tension": self.plant.cable_tension,
-            "buttons": self._buttons,
-        }

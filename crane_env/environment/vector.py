@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from numbers import Integral
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
-import gymnasium
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
@@ -21,17 +19,23 @@ from crane_env.environment.options import (
     seeds_of_each,
     starts_of_each,
 )
+from crane_env.environment.pictures import Pictures
 from crane_env.environment.randomisation import Randomisation
-from crane_env.environment.single import ACTION_ROUNDING, StepRecord
-from crane_env.environment.vector_info import lay_out, lay_out_objects
-from crane_env.kinematics import payload_position, payload_velocity
+from crane_env.environment.report import (
+    StepRecord,
+    lay_out,
+    lay_out_objects,
+    report_period,
+    report_start,
+)
 from crane_env.observation import CraneState, Observation, observation_space
 from crane_env.operators.base import Operator
 from crane_env.operators.batch import VectorOperator, VectorOperatorSpec, make_operators
 from crane_env.parameters import CraneParameters
-from crane_env.plant.batch import VectorDriveReport, VectorPlant
+from crane_env.plant.batch import VectorPlant
 from crane_env.plant.start import AT_REST, Start
 from crane_env.stage_cost import StageCost
+from crane_env.support.checks import choice, whole
 
 if TYPE_CHECKING:
     from crane_env.rendering.scene import VectorRenderer
@@ -65,13 +69,13 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
 
     Truncated after `max_episode_steps`. A crane that is driven until its simulation diverges (a
     payload thrown over the girder can do that) stays where it was before the step, its episode is
-    truncated too, and `info` has `simulation_failed`. Not terminated: rewards are negative, and a
+    truncated too, and `info` says `simulation_failed`. Not terminated: rewards are negative, and a
     learner would learn to crash. The other cranes do not notice.
 
     ## Truth behind wrappers
 
-    As of `OILCraneEnv`: `recorder` is called with a `StepRecord` whose values are arrays over the
-    cranes; the time of a crane that has just been placed is 0.
+    As of `OILCraneEnv`: `times`, and `recorder`, which is called with a `StepRecord` whose values
+    are arrays over the cranes; the time of a crane that has just been placed is 0.
 
     ## Domain randomisation
 
@@ -121,15 +125,18 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         render_height: int = 720,
     ) -> None:
         super().__init__()
-        self.num_envs = _count("num_envs", num_envs)
+        self.num_envs = whole("num_envs", num_envs, 1)
         endless = max_episode_steps is None or max_episode_steps == -1
-        self.max_episode_steps = None if endless else _count("max_episode_steps", max_episode_steps)
-        self.autoreset_mode = _autoreset_mode(autoreset_mode)
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"Unknown render_mode {render_mode!r}; valid: None, rgb_array.")
+        self.max_episode_steps = (
+            None if endless else whole("max_episode_steps", max_episode_steps, 1)
+        )
+        if not isinstance(autoreset_mode, AutoresetMode):
+            values = [mode.value for mode in AutoresetMode]
+            autoreset_mode = AutoresetMode(choice("autoreset_mode", autoreset_mode, values))
+        self.autoreset_mode = autoreset_mode
+        modes = self.metadata["render_modes"]
+        self._pictures = Pictures(render_mode, modes, render_width, render_height)
         self.render_mode = render_mode
-        self.render_width = render_width
-        self.render_height = render_height
         self.cost = StageCost.of(cost)
         self.randomisation = Randomisation.of(randomisation)
         self._own_parameters = _cranes(parameters, self.num_envs)
@@ -156,13 +163,17 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._step_index = np.zeros(self.num_envs, dtype=np.int64)
         self._begun = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
-        self._renderer: VectorRenderer | None = None
         self.recorder: Callable[[StepRecord], None] | None = None
 
     @property
     def cranes(self) -> tuple[CraneParameters, ...]:
         """Parameters of each crane in its present episode."""
         return tuple(self.plant.cranes)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Time since the reset of each crane [s], shape (N,)."""
+        return np.multiply(self._step_index, self.parameters.control_period, dtype=np.float64)
 
     def reset(
         self,
@@ -207,10 +218,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         for index, random in randoms.items():
             self._randoms[index] = random
         self._begin(indices, operators, starts)
-        states = self.plant.states()
-        signals = self._signals(states)
-        self._record(states, signals, np.full(self.num_envs, np.nan), np.zeros(self.num_envs))
-        return self._observe(states), lay_out(signals, chosen)
+        state, tension = self.plant.measure()
+        info = self._complete(report_start(state, tension))
+        self._record(state, info, np.full(self.num_envs, np.nan), np.zeros(self.num_envs))
+        infos = lay_out(info, chosen)
+        return np.column_stack((*state, self._operator.references)), infos
 
     def step(
         self, actions: NDArray[Any]
@@ -242,24 +254,16 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         moving = ~self._ended
         asked = self._checked_actions(actions, moving)
         limit = self.parameters.acceleration_max
-        command = np.clip(asked, -limit, limit)
         travel_reference, hoist_reference = self._operator.references.copy().T
-        drive = self.plant.step(command, hoist_reference, moving)
+        outcome = self.plant.step(np.clip(asked, -limit, limit), hoist_reference, moving)
         self._step_index += moving
-        states = self.plant.states()
-        times = np.multiply(self._step_index, self.parameters.control_period, dtype=np.float64)
-        self._operator.press(times, states, moving & ~drive.failed)
+        states = np.column_stack(outcome.state)
+        self._operator.press(self.times, states, moving & ~outcome.failed)
 
-        signals = self._signals(states)
-        earned = self._rewards(states, signals["payload_velocity"], travel_reference, drive)
-        rewards = np.where(moving, sum(earned.values()), 0.0)
-        earned["acceleration"] = drive.acceleration
-        earned["action_clipped"] = np.abs(asked - command) > ACTION_ROUNDING * limit
-        earned["drive_limited"] = drive.limited
-        if drive.failed.any():
-            earned["simulation_failed"] = drive.failed.copy()
+        reward, info = report_period(outcome, asked, travel_reference, self.parameters, self.cost)
+        rewards = np.where(moving, reward, 0.0)
         terminations = np.zeros(self.num_envs, dtype=np.bool_)
-        truncations = drive.failed
+        truncations = outcome.failed.copy()
         if self.max_episode_steps is not None:
             truncations |= moving & (self._step_index >= self.max_episode_steps)
         self._ended = truncations.copy()
@@ -267,19 +271,22 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         infos: dict[str, Any] = {}
         beginning = ~moving
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
-            beginning, moving = self._ended.copy(), ~self._ended
-            infos |= lay_out_objects("final_obs", self._observe(states), beginning)
-            infos["final_info"] = lay_out({**signals, **earned}, beginning)
+            beginning = self._ended.copy()
+            last = np.concatenate((states, self._operator.references), axis=1)
+            infos |= lay_out_objects("final_obs", last, beginning)
+            infos["final_info"] = lay_out(self._complete(info), beginning)
             infos["_final_info"] = beginning.copy()
+        state: Any = outcome.state
         if beginning.any():
             indices = np.flatnonzero(beginning)
             self._begin(indices, self._default_operators, [AT_REST] * len(indices))
-            states = self.plant.states()
-            signals = self._signals(states)
-        self._record(states, {**signals, **earned}, asked, rewards)
-        infos |= lay_out(signals, np.ones(self.num_envs, dtype=np.bool_))
-        infos |= lay_out(earned, moving)
-        return self._observe(states), rewards, terminations, truncations, infos
+            state, tension = self.plant.measure()
+            begun = report_start(state, tension)
+            info = {key: np.where(beginning, begun[key], info[key]) for key in begun}
+        self._record(state, self._complete(info), asked, rewards)
+        infos |= lay_out(info, np.ones(self.num_envs, dtype=np.bool_))
+        observations = np.column_stack((*state, self._operator.references))
+        return observations, rewards, terminations, truncations, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Draws each crane as `OILCraneEnv.render` does.
@@ -290,29 +297,24 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         Raises:
             RuntimeError: no OpenGL back end; the message says what to set and install.
         """
-        if self.render_mode is None:
-            gymnasium.logger.warn(
-                "render() without a render_mode; use "
-                'gymnasium.make_vec(..., render_mode="rgb_array").'
-            )
-            return None
-        if self._renderer is None:
-            from crane_env.rendering.scene import VectorRenderer
+        operator = self._operator
+        return cast(
+            "tuple[NDArray[np.uint8], ...] | None",
+            self._pictures.draw(self._make_renderer, operator.buttons, operator.references[:, 0]),
+        )
 
-            self._renderer = VectorRenderer(
-                self.plant, width=self.render_width, height=self.render_height
-            )
-        return self._renderer.draw(self._operator.buttons, self._operator.references[:, 0])
+    def _make_renderer(self) -> VectorRenderer:
+        from crane_env.rendering.scene import VectorRenderer
+
+        return VectorRenderer(self.plant, *self._pictures.size)
 
     def close_extras(self) -> None:
         """Frees the graphics memory."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        self._pictures.close()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but graphics and recorder: a copy continues bit for bit, draws for itself."""
-        return {**self.__dict__, "_renderer": None, "recorder": None}
+        """Everything but the recorder: a copy continues bit for bit and draws for itself."""
+        return {**self.__dict__, "recorder": None}
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -358,53 +360,21 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._begun[indices] = True
         self._ended[indices] = False
 
-    def _observe(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate((states, self._operator.references), axis=1)
+    def _complete(self, info: dict[str, Any]) -> dict[str, Any]:
+        info["buttons"] = self._operator.buttons.copy()
+        return info
 
     def _record(
         self,
-        states: NDArray[np.float64],
+        state: CraneState,
         info: dict[str, Any],
         asked: NDArray[np.float64],
         rewards: NDArray[np.float64],
     ) -> None:
-        if self.recorder is None:
-            return
-        times = np.multiply(self._step_index, self.parameters.control_period, dtype=np.float64)
-        truth = Observation._make(self._observe(states).T)
-        own = {name: values.copy() for name, values in info.items()}
-        self.recorder(StepRecord(times, truth, own, asked, rewards.copy()))
-
-    def _signals(self, states: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-        """Info that describes the cranes as they are."""
-        position, rate, length, length_rate, sway, sway_rate = states.T
-        return {
-            "payload_position": payload_position(position, length, sway),
-            "payload_velocity": payload_velocity(rate, length, length_rate, sway, sway_rate),
-            "cable_tension": self.plant.cable_tension,
-            "buttons": self._operator.buttons.copy(),
-        }
-
-    def _rewards(
-        self,
-        states: NDArray[np.float64],
-        velocity: NDArray[np.float64],
-        travel_reference: NDArray[np.float64],
-        drive: VectorDriveReport,
-    ) -> dict[str, NDArray[Any]]:
-        """Terms of the reward, by their keys in `info`."""
-        terms = self.cost.terms(
-            velocity,
-            travel_reference,
-            states[:, CABLE_LENGTH],
-            states[:, SWAY_ANGLE],
-            drive.acceleration,
-        )
-        period = self.parameters.control_period
-        return {
-            f"reward_{name}": -period * term
-            for name, term in zip(terms._fields, terms, strict=True)
-        }
+        if self.recorder is not None:
+            truth = Observation(*state, *self._operator.references.copy().T)
+            own = {name: values.copy() for name, values in info.items()}
+            self.recorder(StepRecord(self.times, truth, own, asked, rewards.copy()))
 
     def _checked_actions(
         self, actions: NDArray[Any], moving: NDArray[np.bool_]
@@ -420,24 +390,6 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
                 f"not {asked[bad[0]]} m/s^2."
             )
         return asked
-
-
-CABLE_LENGTH = CraneState._fields.index("cable_length")
-SWAY_ANGLE = CraneState._fields.index("sway_angle")
-
-
-def _count(name: str, value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
-        raise ValueError(f"{name} must be a positive whole number, not {value!r}.")
-    return int(value)
-
-
-def _autoreset_mode(value: AutoresetMode | str) -> AutoresetMode:
-    try:
-        return AutoresetMode(value)
-    except ValueError as error:
-        valid = ", ".join(mode.value for mode in AutoresetMode)
-        raise ValueError(f"Unknown autoreset_mode {value!r}; valid: {valid}.") from error
 
 
 def _cranes(given: CraneSpec | Sequence[CraneSpec], count: int) -> list[CraneParameters]:

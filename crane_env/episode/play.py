@@ -24,7 +24,7 @@ from crane_env.parameters import CraneParameters
 from crane_env.support import checks
 
 if TYPE_CHECKING:
-    from crane_env.environment.single import StepRecord
+    from crane_env.environment.report import StepRecord
 
 SEEN_BEFORE = ("payload_position", "payload_velocity", "cable_tension")
 """Entries of `info` that describe the state in which the controller acted."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
 from crane_env.plant.drives import ARRAYS, Drives, Stroke
+from crane_env.plant.outcome import Outcome
 from crane_env.plant.single import (
     DRIVE_ERROR,
     DRUM,
-    REACH,
     SETPOINT,
-    SWAY,
     Plant,
     build_model,
     cable_gains,
@@ -39,20 +38,6 @@ VARIABLE = ("payload_mass", "cable_stiffness", "cable_length_initial", "drive_ba
 SHARED = tuple(
     field.name for field in dataclasses.fields(CraneParameters) if field.name not in VARIABLE
 )
-
-
-class VectorDriveReport(NamedTuple):
-    """What the drives did with their commands; see `DriveReport`.
-
-    Attributes:
-        acceleration: of each setpoint [m/s^2], shape (N,).
-        limited: whether a limit overruled the command, shape (N,).
-        failed: the simulation diverged; the crane is where it was before the step. Shape (N,).
-    """
-
-    acceleration: NDArray[np.float64]
-    limited: NDArray[np.bool_]
-    failed: NDArray[np.bool_]
 
 
 class VectorPlant:
@@ -178,7 +163,7 @@ class VectorPlant:
         acceleration: NDArray[np.float64],
         hoist_reference: NDArray[np.float64],
         moving: NDArray[np.bool_],
-    ) -> VectorDriveReport:
+    ) -> Outcome:
         """Advances one control period; see `Plant.step`.
 
         Args:
@@ -207,34 +192,27 @@ class VectorPlant:
         if failed.any():
             self._position[failed] = position[failed]
             self._velocity[failed] = velocity[failed]
-        return VectorDriveReport(travel.acceleration, travel.limited, failed)
+        return Outcome(*self.measure(), travel.acceleration, travel.limited, failed)
+
+    def measure(self) -> tuple[CraneState, NDArray[np.float64]]:
+        """Motion of each crane now, and the tensions of the cables [N], arrays of shape (N,)."""
+        setpoint, error, sway, reach, drum = self._position.T
+        setpoint_rate, error_rate, sway_rate, reach_rate, drum_rate = self._velocity.T
+        stiffness, damping = self._cable_gains[:, 1], self._cable_gains[:, 2]
+        pull = cable_pull(stiffness, damping, reach, reach_rate, drum, drum_rate)
+        state: Any = CraneState(
+            setpoint + error,
+            setpoint_rate + error_rate,
+            reach.copy(),
+            reach_rate.copy(),
+            sway.copy(),
+            sway_rate.copy(),
+        )
+        return state, np.maximum(0.0, pull)
 
     def states(self) -> NDArray[np.float64]:
         """Motion of each crane now, in the order of `CraneState`, shape (N, 6)."""
-        position, velocity = self._position, self._velocity
-        states = np.empty((len(self), len(CraneState._fields)))
-        np.add(position[:, SETPOINT], position[:, DRIVE_ERROR], out=states[:, 0])
-        np.add(velocity[:, SETPOINT], velocity[:, DRIVE_ERROR], out=states[:, 1])
-        states[:, 2] = position[:, REACH]
-        states[:, 3] = velocity[:, REACH]
-        states[:, 4] = position[:, SWAY]
-        states[:, 5] = velocity[:, SWAY]
-        return states
-
-    @property
-    def cable_tension(self) -> NDArray[np.float64]:
-        """Tensions of the cables [N]; exactly 0 when slack. Shape (N,)."""
-        position, velocity, gains = self._position, self._velocity, self._cable_gains
-        pull = cable_pull(
-            gains[:, 1],
-            gains[:, 2],
-            position[:, REACH],
-            velocity[:, REACH],
-            position[:, DRUM],
-            velocity[:, DRUM],
-        )
-        tension: NDArray[np.float64] = np.maximum(0.0, pull)
-        return tension
+        return np.column_stack(self.measure()[0])
 
     def copy_to(self, index: int, plant: Plant) -> None:
         """Puts a plant of the same parameters into the state of one crane."""

@@ -156,6 +156,7 @@ class Drives:
         "_period",
         "_rail_stroke",
         "_speed_max",
+        "_unlimited",
     )
 
     def __init__(
@@ -165,6 +166,10 @@ class Drives:
         self._speed_max = parameters.trolley_speed_max
         self._acceleration_max = parameters.acceleration_max
         self._rail_stroke = Stroke(0.0, parameters.trolley_position_limit)
+        braking = parameters.trolley_speed_max / parameters.acceleration_max
+        self._unlimited = parameters.trolley_position_limit - parameters.trolley_speed_max * (
+            self._period + 0.5 * braking
+        )
         self._drum_stroke = drum_stroke
         self._hoist_steps = parameters.hoist_ramp_time == 0.0
         # A true step of the hoist reverses within one period at most.
@@ -183,6 +188,12 @@ class Drives:
         """
         minimum, maximum, _, _, where = self._arithmetic
         wanted = rate + acceleration * self._period
+        if (
+            self._arithmetic is FLOATS
+            and abs(wanted) <= self._speed_max
+            and abs(position) < self._unlimited
+        ):
+            return DriveReport(acceleration, False)  # as in most periods; see `hoist`
         reached = next_rate(
             rate,
             minimum(maximum(wanted, -self._speed_max), self._speed_max),
@@ -203,15 +214,18 @@ class Drives:
             rate: of the unstretched length [m/s].
             reference: cable rate that the hoist ramps to, > 0 lengthens [m/s].
         """
-        reached = next_rate(
-            rate,
-            reference,
-            position=length,
-            stroke=self._drum_stroke,
-            acceleration=self._hoist_acceleration,
-            period=self._period,
-            arithmetic=self._arithmetic,
-        )
+        if self._arithmetic is FLOATS and reference == 0.0 and abs(rate) < RATE_ROUNDING:
+            reached = 0.0  # as in most periods; what `next_rate` says too, but not as quickly
+        else:
+            reached = next_rate(
+                rate,
+                reference,
+                position=length,
+                stroke=self._drum_stroke,
+                acceleration=self._hoist_acceleration,
+                period=self._period,
+                arithmetic=self._arithmetic,
+            )
         if self._hoist_steps:
             rate = reached
         return HoistReport(

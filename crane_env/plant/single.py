@@ -29,7 +29,8 @@ from numpy.typing import NDArray
 
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
-from crane_env.plant.drives import DriveReport, Drives, Stroke
+from crane_env.plant.drives import Drives, Stroke
+from crane_env.plant.outcome import Outcome
 from crane_env.plant.start import AT_REST, Start
 
 SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
@@ -79,18 +80,6 @@ def drum_stroke(parameters: CraneParameters) -> Stroke:
         parameters.unstretched_length(parameters.cable_length_min),
         parameters.unstretched_length(parameters.cable_length_max),
     )
-
-
-class SimulationDivergedError(RuntimeError):
-    """The simulation of a control period diverged; the crane stays where it was before.
-
-    Attributes:
-        drive: what the trolley drive was asked for in that period.
-    """
-
-    def __init__(self, drive: DriveReport) -> None:
-        super().__init__("The simulation diverged; the crane stays where it was.")
-        self.drive = drive
 
 
 class Plant:
@@ -147,22 +136,17 @@ class Plant:
         self._set_cable_gains(position[DRUM])
         mujoco.mj_forward(self.model, self.data)
 
-    def step(self, acceleration: float, hoist_reference: float) -> DriveReport:
+    def step(self, acceleration: float, hoist_reference: float) -> Outcome:
         """Advances one control period.
 
         Args:
             acceleration: what the trolley drive is asked for, within its limit [m/s^2].
             hoist_reference: cable rate that the hoist ramps to, > 0 lengthens [m/s].
-
-        Raises:
-            SimulationDivergedError: the equations of motion have no usable solution; the crane
-                stays where it was.
         """
         position, velocity = self._position.tolist(), self._velocity.tolist()
-        setpoint, _, _, _, drum = position
-        setpoint_rate, _, _, _, drum_rate = velocity
+        drum, drum_rate = position[DRUM], velocity[DRUM]
         data, begin = self.data, self.data.time
-        travel = self._drives.travel(setpoint, setpoint_rate, acceleration)
+        travel = self._drives.travel(position[SETPOINT], velocity[SETPOINT], acceleration)
         hoist_acceleration, drum_middle = 0.0, drum
         if hoist_reference or drum_rate:  # else the hoist stays at rest, as it is most of the time
             hoist = self._drives.hoist(drum, drum_rate, hoist_reference)
@@ -172,12 +156,12 @@ class Plant:
         self._control[1] = hoist_acceleration
         self._set_cable_gains(drum_middle)
         mujoco.mj_step(self.model, data, nstep=self._substeps)
-        if data.time <= begin:
+        failed = data.time <= begin
+        if failed:
             # MuJoCo has counted a diverged state and gone on from the model's origin at time 0.
             self._position[:], self._velocity[:], data.time = position, velocity, begin
             mujoco.mj_forward(self.model, data)
-            raise SimulationDivergedError(travel)
-        return travel
+        return Outcome(*self.measure(), travel.acceleration, travel.limited, failed)
 
     def _set_cable_gains(self, unstretched_length: float) -> None:
         parameters = self.parameters
@@ -185,13 +169,20 @@ class Plant:
             parameters.cable_stiffness, parameters.cable_damping, unstretched_length
         )
 
-    def state(self) -> CraneState:
-        """Motion of trolley, cable and payload now."""
-        setpoint, error, sway, reach, _ = self._position.tolist()
-        setpoint_rate, error_rate, sway_rate, reach_rate, _ = self._velocity.tolist()
-        return CraneState(
+    def measure(self) -> tuple[CraneState, float]:
+        """Motion of trolley, cable and payload now, and the tension of the cable [N]."""
+        setpoint, error, sway, reach, drum = self._position.tolist()
+        setpoint_rate, error_rate, sway_rate, reach_rate, drum_rate = self._velocity.tolist()
+        _, stiffness, damping = self._cable_gains.tolist()
+        pull = cable_pull(stiffness, damping, reach, reach_rate, drum, drum_rate)
+        state = CraneState(
             setpoint + error, setpoint_rate + error_rate, reach, reach_rate, sway, sway_rate
         )
+        return state, max(0.0, pull)
+
+    def state(self) -> CraneState:
+        """Motion of trolley, cable and payload now."""
+        return self.measure()[0]
 
     @property
     def time(self) -> float:
@@ -251,11 +242,7 @@ class Plant:
     @property
     def cable_tension(self) -> float:
         """Tension of the cable [N]; exactly 0 when slack."""
-        _, _, _, reach, drum = self._position.tolist()
-        _, _, _, reach_rate, drum_rate = self._velocity.tolist()
-        _, stiffness, damping = self._cable_gains.tolist()
-        pull: float = cable_pull(stiffness, damping, reach, reach_rate, drum, drum_rate)
-        return max(0.0, pull)
+        return self.measure()[1]
 
     @property
     def drive_force(self) -> float:

@@ -57,7 +57,7 @@ class CraneRenderer:
         RuntimeError: no OpenGL back end, or no display; the message says what to set and install.
     """
 
-    def __init__(self, plant: Plant, *, width: int, height: int, window: bool) -> None:
+    def __init__(self, plant: Plant, width: int, height: int, *, window: bool) -> None:
         least_width, least_height = SMALLEST_PICTURE
         if width < least_width or height < least_height:
             raise ValueError(
@@ -204,7 +204,7 @@ class VectorRenderer:
         RuntimeError: no OpenGL back end; the message says what to set and install.
     """
 
-    def __init__(self, plant: VectorPlant, *, width: int, height: int) -> None:
+    def __init__(self, plant: VectorPlant, width: int, height: int) -> None:
         self._plant = plant
         self._copies = [Plant(crane) for crane in plant.cranes]
         self._renderers: list[CraneRenderer] = []

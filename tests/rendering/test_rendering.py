@@ -655,7 +655,7 @@ def test_a_real_window_opens_shows_and_closes_beside_a_picture_without_one(displ
             shown.step(np.array([1.0]))
             drawn.step(np.array([1.0]))
         print(bool((before != drawn.render()).any()), bool(glfw.get_current_context()))
-        window = shown.unwrapped._renderer._canvas._window._handle
+        window = shown.unwrapped._pictures._renderer._canvas._window._handle
         print(glfw.get_window_size(window))
         glfw.set_window_should_close(window, True)
         for _ in range(50):
