@@ -356,6 +356,23 @@ def test_a_diverged_simulation_truncates_the_episode_and_says_so() -> None:
     assert np.isfinite(env.reset()[0]).all()
 
 
+def test_info_has_the_same_keys_and_types_after_reset_as_after_step() -> None:
+    def described(infos: dict[str, Any]) -> dict[str, Any]:
+        assert all(isinstance(value, (np.generic, np.ndarray)) for value in infos.values())
+        return {key: (value.dtype, value.shape) for key, value in infos.items()}
+
+    single: Any = make()
+    vectors = [gymnasium.make_vec("OILCrane-v0", 2, vectorization_mode=m) for m in (None, "sync")]
+    for env, actions in ((single, np.zeros(1)), *((v, np.zeros((2, 1))) for v in vectors)):
+        assert described(env.reset(seed=0)[1]) == described(env.step(actions)[4])
+    native, stacked = (described(vector.reset(seed=0)[1]) for vector in vectors)
+    assert native == stacked
+    info = single.reset(seed=0)[1]
+    assert (info["buttons"].dtype, info["buttons"].shape) == (np.bool_, (4,))
+    still = ("acceleration", "action_clipped", "drive_limited", "reward_tracking", "reward_sway")
+    assert not any(info[key] for key in (*still, "reward_acceleration", "simulation_failed"))
+
+
 def test_the_recorder_sees_the_truth_at_every_control_period_behind_wrappers() -> None:
     records: list[Any] = []
     bare = make(operator="table1:1")
