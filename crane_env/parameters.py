@@ -12,7 +12,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from crane_env.support.checks import choice, not_negative, positive
 from crane_env.support.fields import from_fields
+
+MAY_BE_ZERO = frozenset(
+    {
+        "cable_damping",
+        "trolley_friction",
+        "sway_friction",
+        "hoist_ramp_time",
+        "drive_bandwidth",
+        "limit_switch_margin",
+    }
+)
+"""Quantities that a crane may be without."""
+
+MAX_DRIVE_STEP = 4.0
+"""Largest drive bandwidth times physics step; the position loop is integrated explicitly."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,15 +88,9 @@ class CraneParameters:
     def __post_init__(self) -> None:
         """Refuses values that no crane can have."""
         for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise ValueError(f"{field.name} must be a number, not {value!r}.")
-            number = float(value)
+            check = not_negative if field.name in MAY_BE_ZERO else positive
+            number = check(field.name, getattr(self, field.name))
             object.__setattr__(self, field.name, number)
-            may_be_zero = field.name in _MAY_BE_ZERO
-            if not math.isfinite(number) or number < 0.0 or (number == 0.0 and not may_be_zero):
-                allowed = "zero or a positive" if may_be_zero else "a positive"
-                raise ValueError(f"{field.name} must be {allowed} finite number, not {value!r}.")
         if not self.cable_length_min < self.cable_length_max:
             raise ValueError(
                 f"cable_length_min ({self.cable_length_min} m) must be below "
@@ -150,9 +160,7 @@ class CraneParameters:
             ValueError: an unknown preset or field name, or a value out of range.
         """
         if isinstance(value, str):
-            if value not in PRESETS:
-                raise ValueError(f"Unknown crane preset {value!r}; valid: {', '.join(PRESETS)}.")
-            return PRESETS[value]
+            return PRESETS[choice("crane preset", value, PRESETS)]
         return from_fields(
             cls,
             value,
@@ -193,20 +201,6 @@ class CraneParameters:
         ratio = 1.0 + self.payload_mass / self.trolley_mass if trolley_free else 1.0
         return 2.0 * math.pi * math.sqrt(cable_length / (self.gravity * ratio))
 
-
-_MAY_BE_ZERO = frozenset(
-    {
-        "cable_damping",
-        "trolley_friction",
-        "sway_friction",
-        "hoist_ramp_time",
-        "drive_bandwidth",
-        "limit_switch_margin",
-    }
-)
-
-MAX_DRIVE_STEP = 4.0
-"""Largest drive bandwidth times physics step; the position loop is integrated explicitly."""
 
 PRESETS: dict[str, CraneParameters] = {
     "paper": CraneParameters.paper(),

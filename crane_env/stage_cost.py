@@ -11,12 +11,12 @@ with payload velocity y, travel reference w, trolley acceleration u and the sway
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
 from crane_env.kinematics import Scalars, sway_displacement
+from crane_env.support.checks import choice, not_negative
 from crane_env.support.fields import from_fields
 
 SwayTerm = Literal["displacement", "angle", "printed"]
@@ -50,13 +50,8 @@ class StageCost:
     def __post_init__(self) -> None:
         """Refuses weights that make no cost."""
         for name in ("sway_weight", "acceleration_weight"):
-            value = getattr(self, name)
-            if not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0.0:
-                raise ValueError(f"{name} must be zero or a positive number, not {value!r}.")
-        if self.sway_term not in get_args(SwayTerm):
-            raise ValueError(
-                f"Unknown sway_term {self.sway_term!r}; valid: {', '.join(get_args(SwayTerm))}."
-            )
+            object.__setattr__(self, name, not_negative(name, getattr(self, name)))
+        choice("sway_term", self.sway_term, get_args(SwayTerm))
 
     @classmethod
     def of(cls, value: StageCost | Mapping[str, Any] | None) -> StageCost:

@@ -41,7 +41,7 @@ def test_many_stages_cost_what_each_costs() -> None:
 @pytest.mark.parametrize(
     ("fields", "sentence"),
     [
-        ({"sway_weight": -1.0}, "sway_weight must be zero or a positive number"),
+        ({"sway_weight": -1.0}, "sway_weight must be zero or a positive finite number"),
         ({"acceleration_weight": math.nan}, "acceleration_weight must be zero or a positive"),
         ({"sway_term": "sway"}, "Unknown sway_term 'sway'; valid: displacement, angle, printed"),
         ({"weight": 1.0}, "Unknown stage cost field 'weight'; valid: sway_weight"),

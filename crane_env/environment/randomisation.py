@@ -8,7 +8,6 @@ are log-uniform. The four are independent.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,10 +15,14 @@ from typing import Any
 import numpy as np
 
 from crane_env.parameters import CraneParameters
+from crane_env.support.checks import positive, shown
 from crane_env.support.fields import from_fields
 
 Range = tuple[float, float]
 """Lowest and highest value."""
+
+LOG_UNIFORM = frozenset({"cable_stiffness", "drive_bandwidth"})
+"""Quantities that differ between cranes by factors."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,13 +51,14 @@ class Randomisation:
             if given is None:
                 continue
             try:
-                low, high = (float(value) for value in given)
+                low, high = (positive("Its end", value) for value in given)
+                ordered = low <= high
             except (TypeError, ValueError):
-                low = high = math.nan
-            if not 0.0 < low <= high < math.inf:
+                ordered = False
+            if not ordered:
                 raise ValueError(
                     f"{field.name} must be a range (low, high) of positive numbers in order, "
-                    f"not {given!r}."
+                    f"not {shown(given)}."
                 )
             object.__setattr__(self, field.name, (low, high))
 
@@ -98,12 +102,9 @@ class Randomisation:
         values = {}
         for name, (low, high) in self.ranges.items():
             share = rng.random()
-            if name in _LOG_UNIFORM:
+            if name in LOG_UNIFORM:
                 value = low * (high / low) ** share
             else:
                 value = low + (high - low) * share
             values[name] = min(max(value, low), high)
         return dataclasses.replace(parameters, **values) if values else parameters
-
-
-_LOG_UNIFORM = frozenset({"cable_stiffness", "drive_bandwidth"})

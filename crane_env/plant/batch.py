@@ -31,6 +31,7 @@ from crane_env.plant.single import (
     drum_stroke,
 )
 from crane_env.plant.start import AT_REST, Start
+from crane_env.support.checks import whole
 
 VARIABLE = ("payload_mass", "cable_stiffness", "cable_length_initial", "drive_bandwidth")
 """Parameters in which cranes that are stepped together may differ."""
@@ -55,16 +56,11 @@ class VectorPlant:
     def __init__(self, cranes: Sequence[CraneParameters], *, threads: int = 0) -> None:
         if not cranes:
             raise ValueError("A vector plant needs at least one crane.")
-        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 0:
-            raise ValueError(
-                f"threads must be a positive whole number, or 0 for one for each processor, "
-                f"not {threads!r}."
-            )
-        self.threads = threads
+        self.threads = whole("threads", threads)
         self.cranes = [cranes[0]] * len(cranes)
         model = build_model(cranes[0])
         self._payload = model.body("payload").id
-        self._batch = Batch(model, len(cranes), threads)
+        self._batch = Batch(model, len(cranes), self.threads)
         self._position: NDArray[np.float64] = self._batch.bind("qpos")
         self._velocity: NDArray[np.float64] = self._batch.bind("qvel")
         self._control: NDArray[np.float64] = self._batch.bind("ctrl")

@@ -527,7 +527,7 @@ def test_without_a_render_mode_there_is_no_picture() -> None:
         ({"max_episode_steps": 0}, "max_episode_steps must be a whole number of at least 1, not 0"),
         ({"autoreset_mode": "Later"}, "Unknown autoreset_mode 'Later'; valid: NextStep, SameStep"),
         ({"render_mode": "human"}, "Unknown render_mode 'human'; valid: rgb_array"),
-        ({"threads": -2}, "threads must be a positive whole number, or 0"),
+        ({"threads": -2}, "threads must be a whole number of at least 0"),
         ({"operator": "nobody"}, "nobody.*valid.*random.*manoeuvre.*table1.*script"),
         ({"operator": ["random", "manoeuvre"]}, "list of operators needs one for each of the 6"),
         ({"parameters": ["paper"]}, "list of parameters needs one for each of the 6"),

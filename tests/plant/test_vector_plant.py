@@ -195,5 +195,5 @@ def test_no_crane_and_a_wrong_number_of_threads_are_refused() -> None:
     with pytest.raises(ValueError, match="at least one crane"):
         VectorPlant([])
     for threads in (-1, 1.5, True):
-        with pytest.raises(ValueError, match="threads must be a positive whole number"):
+        with pytest.raises(ValueError, match="threads must be a whole number of at least 0"):
             VectorPlant([PAPER], threads=threads)  # type: ignore[arg-type]
