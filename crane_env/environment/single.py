@@ -15,7 +15,7 @@ from crane_env.environment.options import check_names, start_of
 from crane_env.environment.pictures import Pictures
 from crane_env.environment.report import StepRecord, report_period, report_start
 from crane_env.observation import CraneState, Observation, observation_space
-from crane_env.operators.base import RELEASED, Buttons
+from crane_env.operators.base import RELEASED, Buttons, Operator
 from crane_env.operators.registry import OperatorSpec, make_operator
 from crane_env.parameters import CraneParameters
 from crane_env.plant.single import Plant
@@ -152,6 +152,11 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     def time(self) -> float:
         """Time since the reset [s]."""
         return self._step_index * self.parameters.control_period
+
+    @property
+    def operator(self) -> Operator:
+        """Who presses the buttons in the present episode."""
+        return self._operator
 
     def truth(self) -> Observation:
         """State of the plant and the references now in force, whatever wraps the environment."""

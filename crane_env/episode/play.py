@@ -7,6 +7,7 @@ never the record of it.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from crane_env.controller import Controller, check_controller, reported_failures
 from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import Observation
+from crane_env.operators.script import ButtonScript
 from crane_env.parameters import CraneParameters
 from crane_env.support import checks
 
@@ -64,6 +66,9 @@ def run_episode(
         ValueError: before anything is played, something that is no OILCrane environment or no
             controller, a seed or `max_steps` out of range, or neither `max_steps` nor a `TimeLimit`
             (which `gymnasium.make` adds).
+
+    Warns:
+        UserWarning: no press of a script falls into the episode.
     """
     if not isinstance(env, gymnasium.Env) or not hasattr(env.unwrapped, "recorder"):
         raise ValueError(
@@ -72,6 +77,8 @@ def run_episode(
         )
     _check(controller, _has_time_limit(env), max_steps, [seed])
     (trajectory,) = _play(env, controller, seed, options, max_steps)
+    inner: Any = env.unwrapped
+    _warn_of_silence(inner.operator, float(trajectory.time[-1]))
     return trajectory
 
 
@@ -138,6 +145,17 @@ def _check(controller: object, has_limit: bool, max_steps: object, seeds: Sequen
     elif not has_limit:
         raise ValueError(
             "This environment has no time limit: give max_steps, or make it with gymnasium.make."
+        )
+
+
+def _warn_of_silence(operator: object, last_step: float) -> None:
+    program = getattr(operator, "program", None)
+    if isinstance(program, ButtonScript) and program.presses and program.presses[0] > last_step:
+        warnings.warn(
+            f"No press of {program.name!r} falls into this episode: the first one is at "
+            f"{program.presses[0]:.6g} s, the last control step at {last_step:.6g} s. The times of "
+            "a script are in seconds from the episode's start.",
+            stacklevel=3,
         )
 
 

@@ -85,6 +85,11 @@ class ButtonScript:
             )
         object.__setattr__(self, "schedule", _schedule(_python_entries(self.schedule)))
 
+    @property
+    def presses(self) -> list[float]:
+        """Times from which any button is pressed [s]."""
+        return [event.time for event in self.schedule if any(event.buttons)]
+
     def events(
         self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters
     ) -> Iterator[ButtonEvent]:

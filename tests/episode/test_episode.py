@@ -6,6 +6,7 @@ import dataclasses
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -15,7 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from crane_env import CraneParameters, Observation, Trajectory, run_episode
+from crane_env import Buttons, CraneParameters, Observation, Trajectory, run_episode
+from crane_env.operators.base import RELEASED
 
 
 class Pusher:
@@ -180,12 +182,59 @@ def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         record.to_parquet(tmp_path / "episode.parquet")
 
 
-def test_an_environment_without_time_limit_needs_max_steps() -> None:
-    env = gymnasium.make("OILCrane-v0").unwrapped
-    env.spec = None
+@pytest.mark.parametrize("limit", [{"max_episode_steps": -1}, None])
+def test_an_environment_without_time_limit_needs_max_steps(limit: Any) -> None:
+    env = gymnasium.make("OILCrane-v0", **(limit or {}))
+    env = env if limit else env.unwrapped
     with pytest.raises(ValueError, match="no time limit: give max_steps"):
         run_episode(env, Pusher(0))
     assert len(run_episode(env, Pusher(0), max_steps=7)) == 7
+
+
+class Alarm(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Rings when it is reset."""
+
+    def reset(self, **_: Any) -> Any:
+        raise AssertionError("played")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        *(({"max_steps": bad}, "max_steps must be a whole") for bad in (0, -5, 2.5, "10", True)),
+        *(({"seed": bad}, "seed must be a whole") for bad in (-1, 2**63, 10**400, 1.0, "1", True)),
+        *(({"controller": bad}, "is an object with reset and act") for bad in (None, Pusher, 3)),
+        ({"env": None}, "run_episode plays an OILCrane environment"),
+        ({"env": gymnasium.make("CartPole-v1")}, "run_episode plays an OILCrane environment"),
+        ({"env": gymnasium.make_vec("OILCrane-v0")}, "run_episodes many of them"),
+    ],
+)
+def test_what_cannot_be_played_or_recorded_is_refused_before(
+    arguments: dict[str, Any], message: str
+) -> None:
+    given = {"env": Alarm(gymnasium.make("OILCrane-v0")), "controller": Pusher(0), **arguments}
+    with pytest.raises(ValueError, match=message):
+        run_episode(given.pop("env"), given.pop("controller"), **given)
+
+
+def test_failures_that_a_controller_reports_are_in_the_record() -> None:
+    class Failing(Pusher):
+        statistics = SimpleNamespace(failures=3)
+
+    class Silent(Pusher):
+        statistics = "none of your business"
+
+    env = gymnasium.make("OILCrane-v0")
+    for controller, failures in ((Failing(0), 3), (Silent(0), 0)):
+        assert run_episode(env, controller, max_steps=2).metrics().solver_failures == failures
+
+
+def test_a_script_of_which_no_press_falls_into_the_episode_is_pointed_out() -> None:
+    for milliseconds, epochs in ((1830.0, 4210.0), (1.7e9, 1.7e9 + 2)):
+        events = [(0.0, RELEASED), (milliseconds, Buttons(up=True)), (epochs, RELEASED)]
+        env = gymnasium.make("OILCrane-v0", operator=events, max_episode_steps=30)
+        with pytest.warns(UserWarning, match="No press of 'script' falls .*in seconds"):
+            run_episode(env, Pusher(0))
 
 
 def test_options_reach_the_reset() -> None:
