@@ -172,7 +172,7 @@ def _play(
     try:
         observation, _ = env.reset(seed=seed, options=options)
         # A wrapper may have reset more than once, or stepped within its reset.
-        del records[: max(k for k, record in enumerate(records) if _placed(record))]
+        del records[: np.flatnonzero(_all_placed(records))[-1]]
         cranes = inner.cranes if many else (inner.parameters,)
         controller.reset()
         while not over(ended):
@@ -189,9 +189,11 @@ def _play(
     return _trajectories(records, acts, cranes, failures)
 
 
-def _placed(record: StepRecord) -> bool:
-    """Whether all cranes of a record have just been placed by a reset."""
-    return bool(np.all(np.equal(record.time, 0.0)))
+def _all_placed(records: list[StepRecord]) -> NDArray[np.bool_]:
+    """Of which records all cranes have just been placed by a reset, shape (number of records,)."""
+    times = np.array([record.time for record in records])
+    placed: NDArray[np.bool_] = (times.reshape(len(records), -1) == 0.0).all(axis=1)
+    return placed
 
 
 def _trajectories(
@@ -201,17 +203,17 @@ def _trajectories(
     solver_failures: int,
 ) -> list[Trajectory]:
     """The trajectory of each crane; one row a control period, from one record to the next."""
-    begun_anew = [k for k, record in enumerate(records) if k and _placed(record)]
-    if begun_anew:
+    begun_anew = np.flatnonzero(_all_placed(records))[1:2]
+    if begun_anew.size:
         records = records[: begun_anew[0]]
     before, after = records[:-1], records[1:]
 
-    def column(values: list[Any]) -> NDArray[Any]:
+    def column(values: Any) -> NDArray[Any]:
         return np.array(values).reshape(len(after), len(cranes))
 
     columns = {"time": column([record.time for record in before])}
-    for place, name in enumerate(Observation._fields):
-        columns[name] = column([record.observation[place] for record in before])
+    seen = np.array([record.observation for record in before])
+    columns |= {name: column(seen[:, k]) for k, name in enumerate(Observation._fields)}
     for name in SEEN_BEFORE:
         columns[name] = column([record.info[name] for record in before])
     for name in EARNED_AFTER:
@@ -225,18 +227,14 @@ def _trajectories(
     # A crane that is back at time 0 has begun its next episode: its own ended the step before.
     anew = column([record.time for record in after]) == 0.0
     lengths = np.where(anew.any(axis=0), anew.argmax(axis=0), len(after)).tolist()
-
-    def failed(index: int, length: int) -> bool:
-        given = after[length - 1].info.get("simulation_failed", False)
-        return bool(np.broadcast_to(given, len(cranes))[index])
-
+    failed = column([record.info["simulation_failed"] for record in after])
     return [
         Trajectory(
             **{name: values[:length, index].copy() for name, values in columns.items()},
             act_time=act_time[:length],
             parameters=crane,
             solver_failures=solver_failures,
-            simulation_failed=failed(index, length),
+            simulation_failed=bool(failed[length - 1, index]),
         )
         for index, (crane, length) in enumerate(zip(cranes, lengths, strict=True))
     ]
