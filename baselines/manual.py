@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.controller import finite_observation
-from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller
 from crane_env.parameters import CraneParameters
 
@@ -52,6 +51,6 @@ class Manual(Controller):
         return np.array([min(max(gap / self._settling_time, -limit), limit)])
 
 
-def manual(crane: CraneParameters, settings: MpcSettings) -> Manual:
-    """The crane without help; it solves no problem, so that `settings` play no part."""
+def manual(crane: CraneParameters) -> Manual:
+    """The crane without help."""
     return Manual(crane)

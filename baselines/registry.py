@@ -1,14 +1,26 @@
-"""Registry of controllers: a controller is one file plus one line here."""
+"""Registry of controllers: a controller is one file plus one line here.
+
+A factory takes what its controller needs: `build(crane)`, or `build(crane, settings)` where the
+annotation of `settings` says which: a frozen dataclass whose classmethod `of` reads a mapping of
+its fields, such as `MpcSettings`. A factory of your own may leave the annotation out; it then gets
+`MpcSettings`.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
-from collections.abc import Mapping
+import inspect
+import sysconfig
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller
 from crane_env.parameters import CraneParameters
+from crane_env.support.checks import shown
 
 CONTROLLERS: dict[str, str] = {
     "manual": "baselines.manual:manual",
@@ -21,7 +33,7 @@ CONTROLLERS: dict[str, str] = {
     "nmpc-a-ipopt": "baselines.mpc.ipopt_form:nmpc_a_ipopt",
     "nmpc-b-ipopt": "baselines.mpc.ipopt_form:nmpc_b_ipopt",
     "nmpc-a-do-mpc": "baselines.mpc.do_mpc_form:nmpc_a_do_mpc",
-    "ltv": "baselines.mpc.ltv:ltv",
+    "ltv": "baselines.mpc.linear:ltv",
     "tabulated": "baselines.mpc.tabulated:tabulated",
     "tabulated-ltv": "baselines.mpc.tabulated:tabulated_ltv",
     "linear-cvxpy": "baselines.mpc.cvxpy_form:linear_cvxpy",
@@ -29,38 +41,124 @@ CONTROLLERS: dict[str, str] = {
     "ppo": "baselines.rl.onnx_policy:ppo",
     "sac": "baselines.rl.onnx_policy:sac",
 }
-"""Name of each controller and where its factory (crane, settings) -> Controller is."""
+"""Name of each controller and where its factory is."""
+
+LIBRARIES = tuple(sysconfig.get_paths()[kind] for kind in ("stdlib", "purelib", "platlib"))
+"""Folders of other people's code: an error of a user's own module is never placed there."""
+
+
+class FactoryError(ValueError):
+    """A controller of the user's own fails while it is imported or built; says where."""
 
 
 def make_controller(
     name: str,
     *,
     parameters: CraneParameters | Mapping[str, Any] | str | None = None,
-    settings: MpcSettings | Mapping[str, Any] | None = None,
+    settings: object = None,
 ) -> Controller:
     """Builds a controller from nominal parameters.
 
     Args:
         name: one of `CONTROLLERS`, or a factory of your own as "package.module:factory".
         parameters: the crane that the controller believes in; None: the paper's.
-        settings: the optimal control problem; None: the paper's. Ignored by controllers that
-            solve none.
+        settings: of the type that the controller takes, see `settings_type`, or a mapping of
+            fields that differ from its defaults; None: the defaults, the paper's.
 
     Raises:
-        ValueError: an unknown name (the message lists the valid ones), or values out of range.
+        ValueError: an unknown name (the message lists the valid ones), values out of range, unknown
+            settings, or settings for a controller that takes none. `FactoryError`, if a factory of
+            your own fails or its result has no `reset` and `act`.
         ImportError: a package is missing; the message names the extra that brings it.
     """
-    module, colon, factory = CONTROLLERS.get(name, name).partition(":")
-    if not colon:
-        raise ValueError(
-            f"Unknown controller {name!r}; valid: {', '.join(CONTROLLERS)}, or a factory of your "
-            "own as package.module:factory."
+    build = _factory(name)
+    takes = _settings_type(name, build)
+    crane = CraneParameters.of(parameters)
+    if takes is None:
+        if settings is not None:
+            raise ValueError(f"The controller {name!r} takes no settings, but was given some.")
+        arguments: tuple[Any, ...] = (crane,)
+    else:
+        arguments = (crane, takes.of(settings))
+    with _placed_errors(name):
+        controller = build(*arguments)
+    methods = (getattr(controller, method, None) for method in ("reset", "act"))
+    if isinstance(controller, type) or not all(map(callable, methods)):
+        raise FactoryError(
+            f"The factory of {name!r} must return a controller, an object with reset() and "
+            f"act(observation), not {shown(controller)}."
         )
-    try:
+    return controller  # type: ignore[no-any-return]
+
+
+def settings_type(name: str) -> type | None:
+    """Type of the settings that a controller takes; None if it takes none.
+
+    Args:
+        name: as `make_controller` takes it.
+
+    Raises:
+        ValueError: an unknown name, or a factory of another form than `build(crane, settings)`.
+        ImportError: a module is missing.
+    """
+    takes: type | None = _settings_type(name, _factory(name))
+    return takes
+
+
+def _factory(name: str) -> Callable[..., Any]:
+    place = CONTROLLERS.get(name, name) if isinstance(name, str) else ""
+    module, _, factory = place.partition(":")
+    if not all(part.isidentifier() for part in (*module.split("."), factory)):
+        raise ValueError(
+            f"Unknown controller {shown(name)}; valid: {', '.join(CONTROLLERS)}, or a factory of "
+            "your own as package.module:factory."
+        )
+    with _placed_errors(name):
         build = getattr(importlib.import_module(module), factory, None)
-    except ModuleNotFoundError as error:
-        raise ImportError(f"The controller {name!r} cannot be imported: {error}.") from error
     if not callable(build):
         raise ValueError(f"The module {module!r} has no controller factory {factory!r}.")
-    controller: Controller = build(CraneParameters.of(parameters), MpcSettings.of(settings))
-    return controller
+    return build  # type: ignore[no-any-return]
+
+
+def _settings_type(name: str, build: Callable[..., Any]) -> Any:
+    try:
+        parameters = inspect.signature(build, eval_str=True).parameters.values()
+    except (TypeError, ValueError, NameError, AttributeError, SyntaxError) as error:
+        raise FactoryError(f"The factory of {name!r} has no readable signature: {error}.") from None
+    positional = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    if len(positional) == 1:
+        return None
+    if len(positional) == 2:
+        takes = positional[1].annotation
+        if takes is inspect.Parameter.empty:
+            return MpcSettings
+        if dataclasses.is_dataclass(takes) and callable(getattr(takes, "of", None)):
+            return takes
+    raise FactoryError(
+        f"The factory of {name!r} must be build(crane), or build(crane, settings) with settings of "
+        "MpcSettings or another frozen dataclass that has a classmethod of."
+    )
+
+
+@contextmanager
+def _placed_errors(name: str) -> Iterator[None]:
+    """Makes one sentence, with file and line, of whatever a user's own code raises."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise ImportError(f"The controller {name!r} cannot be imported: {error}.") from error
+    except (Exception, SystemExit) as error:
+        if name in CONTROLLERS:
+            raise
+        kind = ImportError if isinstance(error, ImportError) else FactoryError
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        raise kind(f"The controller {name!r} fails with {what} ({_place(error)}).") from error
+
+
+def _place(error: BaseException) -> str:
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{error.filename}, line {error.lineno}"
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [f for f in frames if not f.filename.startswith(("<", __file__, *LIBRARIES))]
+    last = (own or frames)[-1]
+    return f"{last.filename}, line {last.lineno}"

@@ -16,11 +16,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from baselines.evaluation.figures import save_figure
-from baselines.mpc.linear import CostModel, adaptive_cost
-from baselines.mpc.ltv import time_varying_cost
+from baselines.mpc.cost_table import first_move_errors
+from baselines.mpc.linear import CostModel, adaptive_cost, time_varying_cost
 from baselines.mpc.prediction.cable import hoist_stop_time
 from baselines.mpc.settings import MpcSettings
-from baselines.mpc.table_error import first_move_errors
 from baselines.mpc.tabulated import AdaptiveTable, LengthGrid, LengthRateGrid, TimeVaryingTable
 from crane_env.parameters import CraneParameters
 from crane_env.support.atomic_file import atomic_file

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.evaluation.episode_spec import EpisodeSpec
+from baselines.evaluation.episode_spec import EpisodeSpec, build_controller
 from baselines.evaluation.provenance import git_state, machine, package_versions
 from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
 from baselines.evaluation.worker import Task
 from baselines.evaluation.worker_pool import play_all
-from baselines.registry import make_controller
 
 MANIFEST_FORMAT = "oilcrane-manifest-1"
 """Version of the manifest's layout."""
@@ -31,8 +30,7 @@ def check_controllers(specs: Sequence[EpisodeSpec]) -> None:
         ImportError: a package is missing; the message names the extra that brings it.
     """
     for spec in {(spec.controller, spec.setup.key): spec for spec in specs}.values():
-        setup = spec.setup
-        make_controller(spec.controller, parameters=setup.parameters, settings=setup.settings)
+        build_controller(spec)
 
 
 def compare(

@@ -21,8 +21,9 @@ import gymnasium
 
 from baselines.evaluation.provenance import code_identity
 from baselines.mpc.settings import MpcSettings
-from baselines.registry import CONTROLLERS, make_controller
+from baselines.registry import CONTROLLERS, make_controller, settings_type
 from crane_env import CraneParameters, Trajectory, make_operator, run_episode
+from crane_env.controller import Controller
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,9 +153,7 @@ def play(spec: EpisodeSpec) -> Trajectory:
         ImportError: a package is missing; the message names the extra that brings it.
     """
     setup = spec.setup
-    controller = make_controller(
-        spec.controller, parameters=setup.parameters, settings=setup.settings
-    )
+    controller = build_controller(spec)
     env = gymnasium.make(
         "OILCrane-v0",
         operator=spec.operator,
@@ -167,6 +166,17 @@ def play(spec: EpisodeSpec) -> Trajectory:
         return run_episode(env, controller, seed=spec.seed, max_steps=setup.max_steps)
     finally:
         env.close()
+
+
+def build_controller(spec: EpisodeSpec) -> Controller:
+    """The controller of an episode; the setup's settings are for those that take `MpcSettings`.
+
+    Raises:
+        ValueError, ImportError: as `make_controller`.
+    """
+    name, setup = spec.controller, spec.setup
+    settings = setup.settings if settings_type(name) is MpcSettings else None
+    return make_controller(name, parameters=setup.parameters, settings=settings)
 
 
 @functools.cache

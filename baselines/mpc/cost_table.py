@@ -25,6 +25,16 @@ from numpy.typing import NDArray
 
 from baselines.mpc.linear import CostModel, QuadraticCost
 from crane_env.observation import Observation
+from crane_env.parameters import CraneParameters
+
+NODES_MIN = 4
+"""Fewest nodes per axis: as many as a cubic goes through."""
+
+SWAY = 0.2
+"""Largest sway in the box of states [rad]: more than twice what Table I leads to."""
+
+NodeCost = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""H, shape (N_c, N_c), and F, shape (4, N_c), of a node."""
 
 Interpolation = Callable[[float, int], tuple[int, tuple[float, ...]]]
 """First of the nodes involved and their weights, at a position 0 ... nodes - 1 along an axis."""
@@ -158,13 +168,6 @@ class CostTable:
         )
 
 
-NodeCost = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""H, shape (N_c, N_c), and F, shape (4, N_c), of a node."""
-
-NODES_MIN = 4
-"""Fewest nodes per axis: as many as a cubic goes through."""
-
-
 def measured(observation: Observation) -> tuple[float, float, float, float]:
     """What f is linear in: v [m/s], theta [rad], theta' [rad/s] and w [m/s]."""
     _, velocity, _, _, sway, sway_rate, reference, _ = observation
@@ -193,3 +196,35 @@ def square_root(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     values, vectors = np.linalg.eigh(matrix)
     root: NDArray[np.float64] = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
     return root
+
+
+def first_move_errors(
+    table: CostModel,
+    exact: CostModel,
+    cables: Iterable[tuple[float, float]],
+    crane: CraneParameters,
+) -> NDArray[np.float64]:
+    """Worst error of the first move over the box of states, at each of some cables [m/s^2].
+
+    Args:
+        table: the cost looked up.
+        exact: the cost that it tabulates.
+        cables: length l [m] and rate l' [m/s] of each.
+        crane: gravity g and travel speed alpha.
+    """
+    errors = []
+    for length, rate in cables:
+        difference = first_move_gains(table, length, rate) - first_move_gains(exact, length, rate)
+        sway_rate = SWAY * np.sqrt(crane.gravity / length)
+        box = np.array([crane.travel_speed, SWAY, sway_rate, crane.travel_speed])
+        errors.append(float(np.abs(difference) @ box))
+    return np.array(errors)
+
+
+def first_move_gains(
+    model: CostModel, cable_length: float, cable_rate: float
+) -> NDArray[np.float64]:
+    """K at a cable length [m] and rate [m/s], shape (4,)."""
+    hessian, gradients = node_cost(model, cable_length, cable_rate)
+    gains: NDArray[np.float64] = -np.linalg.solve(hessian, gradients.T)[0]
+    return gains

@@ -21,12 +21,20 @@ import math
 from dataclasses import dataclass
 
 from baselines.mpc.cost_table import Axis, CostTable, node_cost
-from baselines.mpc.linear import LinearMpc, QuadraticCost, adaptive_cost, move_cost
-from baselines.mpc.ltv import time_varying_cost
+from baselines.mpc.linear import (
+    LinearMpc,
+    QuadraticCost,
+    adaptive_cost,
+    move_cost,
+    time_varying_cost,
+)
 from baselines.mpc.prediction.cable import assumed_length, hoist_stop_time
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
+
+RATE_MARGIN = 1.25
+"""Fastest cable in the tables over the hoist's speed: the elastic cable bounces."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +182,3 @@ def tabulated(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:
 def tabulated_ltv(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:
     """`ltv` with its cost from tables over the cable's length and rate."""
     return LinearMpc(crane, settings, TimeVaryingTable(crane, settings, LengthRateGrid()))
-
-
-RATE_MARGIN = 1.25
-"""Fastest cable in the tables over the hoist's speed: the elastic cable bounces."""

@@ -147,12 +147,11 @@ class OnnxController(Controller):
     Args:
         policy: the network.
         crane: nominal parameters, for their limits.
-        settings: limits that replace the crane's, if any.
     """
 
-    def __init__(self, policy: OnnxPolicy, crane: CraneParameters, settings: MpcSettings) -> None:
+    def __init__(self, policy: OnnxPolicy, crane: CraneParameters) -> None:
         self._policy = policy
-        self._limits = TrolleyLimits(crane, settings)
+        self._limits = TrolleyLimits(crane, MpcSettings())
 
     def reset(self) -> None:
         """Nothing to forget; see `Controller.reset`."""
@@ -164,11 +163,11 @@ class OnnxController(Controller):
         return np.array([self._limits.saturate(asked, measured.trolley_velocity)])
 
 
-def ppo(crane: CraneParameters, settings: MpcSettings) -> OnnxController:
-    """The shipped PPO policy; `settings` give it limits only."""
-    return OnnxController(OnnxPolicy(SHIPPED / "ppo.onnx"), crane, settings)
+def ppo(crane: CraneParameters) -> OnnxController:
+    """The shipped PPO policy."""
+    return OnnxController(OnnxPolicy(SHIPPED / "ppo.onnx"), crane)
 
 
-def sac(crane: CraneParameters, settings: MpcSettings) -> OnnxController:
-    """The shipped SAC policy; `settings` give it limits only."""
-    return OnnxController(OnnxPolicy(SHIPPED / "sac.onnx"), crane, settings)
+def sac(crane: CraneParameters) -> OnnxController:
+    """The shipped SAC policy."""
+    return OnnxController(OnnxPolicy(SHIPPED / "sac.onnx"), crane)

@@ -13,8 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import crane_env
-from baselines.mpc.linear import adaptive
-from baselines.mpc.ltv import ltv, time_varying_cost
+from baselines.mpc.linear import adaptive, ltv, time_varying_cost
 from baselines.mpc.nonlinear import nmpc_b
 from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller

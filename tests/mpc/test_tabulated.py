@@ -15,11 +15,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import crane_env
-from baselines.mpc.cost_table import INTERPOLATIONS, NODES_MIN, Axis, measured, square_root
-from baselines.mpc.linear import CostModel, LinearMpc, adaptive, adaptive_cost
-from baselines.mpc.ltv import ltv, time_varying_cost
+from baselines.mpc.cost_table import (
+    INTERPOLATIONS,
+    NODES_MIN,
+    SWAY,
+    Axis,
+    first_move_errors,
+    measured,
+    square_root,
+)
+from baselines.mpc.linear import (
+    CostModel,
+    LinearMpc,
+    adaptive,
+    adaptive_cost,
+    ltv,
+    time_varying_cost,
+)
 from baselines.mpc.settings import MpcSettings
-from baselines.mpc.table_error import SWAY, first_move_errors
 from baselines.mpc.tabulated import (
     AdaptiveTable,
     LengthGrid,

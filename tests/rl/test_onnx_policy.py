@@ -19,7 +19,6 @@ from onnx import TensorProto, helper
 
 import crane_env  # noqa: F401  registers OILCrane-v0
 from baselines import make_controller
-from baselines.mpc.settings import MpcSettings
 from baselines.rl.onnx_policy import FORMAT, SHIPPED, OnnxController, OnnxPolicy, read_card
 from crane_env import CraneParameters, run_episode
 
@@ -68,7 +67,7 @@ def test_whatever_a_policy_asks_for_the_limits_are_kept(seed: int, gain: float) 
             return gain * observations.sum(axis=1, keepdims=True)
 
     crane = CraneParameters()
-    controller = OnnxController(Wild(), crane, MpcSettings())
+    controller = OnnxController(Wild(), crane)
     observation = np.random.default_rng(seed).uniform(-2.0, 2.0, 8)
     action = controller.act(observation)
     assert action.shape == (1,)
@@ -107,7 +106,7 @@ def test_a_corrupt_policy_and_one_that_is_not_there_are_refused(tmp_path: Path) 
 
 def test_a_poisoned_observation_is_refused(tmp_path: Path) -> None:
     policy = OnnxPolicy(write_graph(tmp_path / "sum.onnx"))
-    controller = OnnxController(policy, CraneParameters(), MpcSettings())
+    controller = OnnxController(policy, CraneParameters())
     with pytest.raises(ValueError, match="sway_rate is nan"):
         controller.act(np.array([0.0, 0.0, 8.0, 0.0, 0.0, np.nan, 0.0, 0.0]))
 
