@@ -5,6 +5,8 @@ Importing this package registers `OILCrane-v0` with Gymnasium.
 
 from __future__ import annotations
 
+import importlib.metadata
+
 import gymnasium
 
 from crane_env.controller import Controller
@@ -55,3 +57,10 @@ __all__ = [
     "run_episodes",
     "write_script",
 ]
+
+
+def __getattr__(name: str) -> str:
+    """`__version__`, of the installed distribution; looked up only when it is asked for."""
+    if name == "__version__":
+        return importlib.metadata.version("oilcrane")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

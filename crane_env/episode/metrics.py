@@ -27,14 +27,15 @@ SETTLING_BAND = 0.05
 
 @dataclass(frozen=True)
 class Metrics:
-    """Indices of one episode; NaN where the episode does not define one.
+    """Indices of one episode; only those that say so can be nan.
 
     Attributes:
         IAE: integral of |w - y| [m].
-        release_drift: farthest travel after the travel button's release [m].
-        rest_overshoot: farthest travel after the release beyond the final position [m].
-        settling_time: from the release until the payload stays within 50 mm of its final
-            position [s].
+        release_drift: farthest travel after the travel button's release [m]; nan without a release.
+        rest_overshoot: farthest travel after the release beyond the final position [m]; nan without
+            a release.
+        settling_time: from the release until the payload stays within 50 mm of its final position
+            [s]; nan without a release.
         max_sway: largest |theta| [rad].
         residual_sway: largest |theta| in the last sway period of the episode [rad].
         peak_acceleration: largest |trolley acceleration| [m/s^2].
@@ -43,11 +44,11 @@ class Metrics:
         limit_violations: steps on which the action was clipped, the drive overruled, or the
             trolley faster than its limit [-].
         stage_cost: minus the sum of the rewards [m^2/s].
-        act_median: median time of `act` [s].
+        act_median: median time of a call of `act` [s].
         act_p99: 99th percentile of the time of `act` [s].
         act_max: longest `act` [s].
-        act_late: share of `act` calls longer than the control period [-].
-        solver_failures: solves that ended without a plan [-]; 0 for controllers that solve none.
+        act_late: share of calls of `act` longer than the control period [-].
+        solver_failures: answers that were a fallback's [-]; 0 of a controller that reports none.
         simulation_failed: the simulation diverged and ended the episode early; the indices are of
             what was played until then and belong in no mean.
     """

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,33 +20,11 @@ from crane_env.support.extras import require
 FORMAT = "oilcrane-trajectory-2"
 """Version of the Parquet layout."""
 
-UNITS = {
-    "time": "s",
-    "trolley_position": "m",
-    "trolley_velocity": "m/s",
-    "cable_length": "m",
-    "cable_rate": "m/s",
-    "sway_angle": "rad",
-    "sway_rate": "rad/s",
-    "travel_reference": "m/s",
-    "hoist_reference": "m/s",
-    "payload_position": "m",
-    "payload_velocity": "m/s",
-    "cable_tension": "N",
-    "action": "m/s^2",
-    "acceleration": "m/s^2",
-    "action_clipped": "",
-    "drive_limited": "",
-    "reward": "m^2/s",
-    "reward_tracking": "m^2/s",
-    "reward_sway": "m^2/s",
-    "reward_acceleration": "m^2/s",
-    "act_time": "s",
-}
-"""Unit of each column, in order; those without one are booleans."""
-
 SPEED_TOLERANCE = 0.02
 """The trolley may exceed its setpoint by this much while its drive settles [m/s]."""
+
+Reals = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,20 +36,14 @@ class Trajectory:
     `acceleration` what its drive made of it, and the rewards are those of the step that followed.
     Whatever wraps the environment, all of this is the plant's own.
 
+    The columns from `trolley_position` to `hoist_reference` are the fields of `Observation`.
+
     Attributes:
         time: start of the control period [s].
-        trolley_position: [m].
-        trolley_velocity: [m/s].
-        cable_length: [m].
-        cable_rate: [m/s].
-        sway_angle: [rad].
-        sway_rate: [rad/s].
-        travel_reference: [m/s].
-        hoist_reference: [m/s].
-        payload_position: [m].
-        payload_velocity: [m/s].
-        cable_tension: [N].
-        action: trolley acceleration that the controller asked for [m/s^2].
+        payload_position: along the girder [m].
+        payload_velocity: its rate [m/s].
+        cable_tension: 0 when slack [N].
+        action: trolley acceleration that was asked for [m/s^2].
         acceleration: trolley acceleration that the drive was given [m/s^2].
         action_clipped: the action was beyond its limits.
         drive_limited: speed limit or limit switch overruled the action.
@@ -80,32 +52,35 @@ class Trajectory:
         act_time: duration of the controller's `act`, by the wall clock [s]; nan in a control period
             in which it was not asked because a wrapper repeats actions.
         parameters: the crane.
-        solver_failures: solves of the controller that ended without a plan.
+        solver_failures: answers that were a fallback's, see `crane_env.controller`.
         simulation_failed: the simulation diverged in the last step, where the episode ends. What
             was played until then is no measure of the controller and belongs in no mean.
+
+    Raises:
+        ValueError: columns of other types or lengths, or without a row.
     """
 
-    time: NDArray[np.float64]
-    trolley_position: NDArray[np.float64]
-    trolley_velocity: NDArray[np.float64]
-    cable_length: NDArray[np.float64]
-    cable_rate: NDArray[np.float64]
-    sway_angle: NDArray[np.float64]
-    sway_rate: NDArray[np.float64]
-    travel_reference: NDArray[np.float64]
-    hoist_reference: NDArray[np.float64]
-    payload_position: NDArray[np.float64]
-    payload_velocity: NDArray[np.float64]
-    cable_tension: NDArray[np.float64]
-    action: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
-    action_clipped: NDArray[np.bool_]
-    drive_limited: NDArray[np.bool_]
-    reward: NDArray[np.float64]
-    reward_tracking: NDArray[np.float64]
-    reward_sway: NDArray[np.float64]
-    reward_acceleration: NDArray[np.float64]
-    act_time: NDArray[np.float64]
+    time: Annotated[Reals, "s"]
+    trolley_position: Annotated[Reals, "m"]
+    trolley_velocity: Annotated[Reals, "m/s"]
+    cable_length: Annotated[Reals, "m"]
+    cable_rate: Annotated[Reals, "m/s"]
+    sway_angle: Annotated[Reals, "rad"]
+    sway_rate: Annotated[Reals, "rad/s"]
+    travel_reference: Annotated[Reals, "m/s"]
+    hoist_reference: Annotated[Reals, "m/s"]
+    payload_position: Annotated[Reals, "m"]
+    payload_velocity: Annotated[Reals, "m/s"]
+    cable_tension: Annotated[Reals, "N"]
+    action: Annotated[Reals, "m/s^2"]
+    acceleration: Annotated[Reals, "m/s^2"]
+    action_clipped: Annotated[Flags, ""]
+    drive_limited: Annotated[Flags, ""]
+    reward: Annotated[Reals, "m^2/s"]
+    reward_tracking: Annotated[Reals, "m^2/s"]
+    reward_sway: Annotated[Reals, "m^2/s"]
+    reward_acceleration: Annotated[Reals, "m^2/s"]
+    act_time: Annotated[Reals, "s"]
     parameters: CraneParameters
     solver_failures: int = 0
     simulation_failed: bool = False
@@ -225,6 +200,14 @@ class Trajectory:
             )
         except (KeyError, ValueError) as error:
             raise ValueError(f"{name} is not a whole trajectory: {error}") from error
+
+
+UNITS: dict[str, str] = {
+    name: hint.__metadata__[0]
+    for name, hint in get_type_hints(Trajectory, include_extras=True).items()
+    if hasattr(hint, "__metadata__")
+}
+"""Unit of each column, in order."""
 
 
 def measure(trajectory: Trajectory) -> Metrics:

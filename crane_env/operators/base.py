@@ -155,9 +155,9 @@ class ScheduledOperator:
         self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters
     ) -> None:
         """Draws the episode's events; see `Operator.reset`."""
-        self._events = self.program.events(rng, start, parameters)
-        self._next = next(self._events, None)
-        self._pressed = RELEASED
+        events = self.program.events(rng, start, parameters)
+        first = next(events, None)
+        self._events, self._next, self._pressed = events, first, RELEASED
 
     @property
     def due(self) -> float:

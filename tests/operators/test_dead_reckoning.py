@@ -34,16 +34,6 @@ def test_move_integrates_the_ramp(
     assert position == pytest.approx(0.5 + np.trapezoid(rates, time), abs=1e-5)
 
 
-@given(speeds, accelerations, shares, directions, durations, durations)
-def test_two_moves_in_a_row_are_one(
-    speed: float, acceleration: float, share: float, direction: int, first: float, second: float
-) -> None:
-    axis = Axis(speed, acceleration, -1.0, 1.0)
-    whole = axis.move(0.0, share * speed, direction, first + second)
-    halves = axis.move(*axis.move(0.0, share * speed, direction, first), direction, second)
-    assert halves == pytest.approx(whole, abs=1e-9)
-
-
 @given(speeds, accelerations | st.just(math.inf), shares, directions, st.floats(-5.0, 5.0))
 def test_the_longest_press_stops_at_the_end_of_the_range(
     speed: float, acceleration: float, share: float, direction: int, position: float

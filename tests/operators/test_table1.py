@@ -39,17 +39,6 @@ def test_manoeuvre_1_presses_as_section_5_says() -> None:
     ]
 
 
-def test_manoeuvre_5_lifts_before_it_travels_and_lowers_before_it_stops() -> None:
-    assert drawn(Table1Manoeuvre(5), PAPER) == [
-        ButtonEvent(2.28, Buttons(up=True)),
-        ButtonEvent(4.37, Buttons(forward=True, up=True)),
-        ButtonEvent(2.28 + 4.0, Buttons(forward=True)),
-        ButtonEvent(11.40, Buttons(forward=True, down=True)),
-        ButtonEvent(14.61, Buttons(down=True)),
-        ButtonEvent(11.40 + 4.0, RELEASED),
-    ]
-
-
 @pytest.mark.parametrize("number", range(1, 11))
 def test_each_button_is_held_for_the_time_that_the_table_gives(number: int) -> None:
     t1, _, t3, _ = TABLE_1[number - 1]
