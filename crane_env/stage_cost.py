@@ -67,6 +67,14 @@ class StageCost:
             unknown="stage cost field",
         )
 
+    def sway(self, displacement: Any, sway_angle: Any, travel_reference: Any) -> Any:
+        """The sway term d, linear in numbers, arrays or symbols of l sin(theta), theta and w."""
+        if self.sway_term == "displacement":
+            return displacement
+        if self.sway_term == "angle":
+            return sway_angle
+        return sway_angle - travel_reference
+
     def terms(
         self,
         payload_velocity: Scalars,
@@ -76,12 +84,7 @@ class StageCost:
         acceleration: Scalars,
     ) -> CostTerms:
         """Weighted terms of one stage (floats) or of many (arrays of equal shape); all >= 0."""
-        if self.sway_term == "displacement":
-            sway = sway_displacement(cable_length, sway_angle)
-        elif self.sway_term == "angle":
-            sway = sway_angle
-        else:
-            sway = sway_angle - travel_reference
+        sway = self.sway(sway_displacement(cable_length, sway_angle), sway_angle, travel_reference)
         return CostTerms(
             (payload_velocity - travel_reference) ** 2,
             self.sway_weight * sway**2,

@@ -166,20 +166,16 @@ def benchmark_linear(rounds: int) -> list[Timing]:
     statement = make_controller("adaptive-cvxpy")
     linear = make_controller("linear")
     assert isinstance(adaptive, LinearMpc)
-    program = adaptive._program
-    questions = []
-    for state in states:
-        observation = crane_env.Observation.of(state)
-        hessian, gradient = adaptive._model.cost(observation)
-        lower, upper = adaptive.limits.bounds(observation.trolley_velocity)
-        questions.append((np.ascontiguousarray(hessian), gradient.copy(), upper, lower))
+    observations = map(crane_env.Observation.of, states)
+    questions = [adaptive.quadratic_program(observation) for observation in observations]
     import daqp
 
     kinds = np.zeros(len(questions[0][2]), dtype=np.intc)
 
     def bare(k: int) -> object:
-        hessian, gradient, upper, lower = questions[k]
-        return daqp.solve(hessian, gradient, program._matrix, upper, lower, kinds)
+        hessian, gradient, lower, upper = questions[k]
+        matrix = adaptive.limits.velocity_gain
+        return daqp.solve(hessian, gradient, matrix, upper, lower, kinds)
 
     contestants: dict[str, Callable[[int], object]] = {
         "adaptive": lambda k: adaptive.act(states[k]),

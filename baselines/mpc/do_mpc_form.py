@@ -63,11 +63,7 @@ class DoMpcNmpc(PredictiveController):
         model.set_rhs("angle", casadi.vertcat(next_angle))
         model.set_rhs("angle_rate", casadi.vertcat(next_rate))
         payload_velocity = velocity + length * angle_rate * casadi.cos(angle)
-        sway = {
-            "displacement": length * casadi.sin(angle),
-            "angle": angle,
-            "printed": angle - reference,
-        }[cost.sway_term]
+        sway = cost.sway(length * casadi.sin(angle), angle, reference)
         state_cost = (payload_velocity - reference) ** 2 + cost.sway_weight * sway**2
         model.set_expression("state_cost", state_cost)
         model.set_expression("move_cost", move_weight * move**2)
@@ -104,7 +100,7 @@ class DoMpcNmpc(PredictiveController):
         mpc.set_tvp_fun(present)
         mpc.prepare_nlp()
         for k in range(moves, settings.prediction_horizon):
-            tail = mpc.opt_x["_u", moves - 1, 0] if settings.tail == "hold" else 0.0
+            tail = settings.tail_gain * mpc.opt_x["_u", moves - 1, 0]
             mpc.nlp_cons.append(mpc.opt_x["_u", k, 0] - tail)
             mpc.nlp_cons_lb.append(np.zeros(1))
             mpc.nlp_cons_ub.append(np.zeros(1))

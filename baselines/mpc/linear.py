@@ -151,10 +151,17 @@ class LinearMpc(PredictiveController):
         self._model = model
         self._program = QuadraticProgram(self.limits.velocity_gain)
 
+    def quadratic_program(self, observation: Observation) -> tuple[NDArray[np.float64], ...]:
+        """H, f and the bounds, lower and upper, of (u, `limits.velocity_gain` u) from here.
+
+        Args:
+            observation: finite; what is measured.
+        """
+        cost = self._model.cost(observation)
+        return *cost, *self.limits.bounds(observation.trolley_velocity)
+
     def _plan(self, observation: Observation, shifted_moves: NDArray[np.float64]) -> Plan:
-        hessian, gradient = self._model.cost(observation)
-        lower, upper = self.limits.bounds(observation.trolley_velocity)
-        solution = self._program.solve(hessian, gradient, lower, upper)
+        solution = self._program.solve(*self.quadratic_program(observation))
         return Plan(solution.minimiser, solution.iterations)
 
 
@@ -175,7 +182,7 @@ def move_cost(settings: MpcSettings) -> NDArray[np.float64]:
 
 def adaptive_cost(crane: CraneParameters, settings: MpcSettings) -> AdaptiveCost:
     """Cost at the measured cable length."""
-    prediction = PendulumPrediction(crane.gravity, crane.control_period, settings)
+    prediction = PendulumPrediction(crane, settings)
     return AdaptiveCost(prediction, move_cost(settings), crane.cable_length_min)
 
 
@@ -186,7 +193,7 @@ def time_varying_cost(crane: CraneParameters, settings: MpcSettings) -> TimeVary
 
 def linear(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:
     """MPC of ref. [18]: model (3) at `settings.model_cable_length`."""
-    prediction = PendulumPrediction(crane.gravity, crane.control_period, settings)
+    prediction = PendulumPrediction(crane, settings)
     model = FixedCost(prediction, move_cost(settings), settings.model_cable_length)
     return LinearMpc(crane, settings, model)
 

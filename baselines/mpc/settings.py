@@ -76,6 +76,11 @@ class MpcSettings:
             unknown="MPC setting",
         )
 
+    @property
+    def tail_gain(self) -> float:
+        """Share of the last move that goes on after it: 1 "hold", 0 "zero"."""
+        return float(self.tail == "hold")
+
     def acceleration_range(self, crane: CraneParameters) -> tuple[float, float]:
         """Lowest and highest trolley acceleration on this crane [m/s^2]."""
         return self.acceleration_limits or (-crane.acceleration_max, crane.acceleration_max)

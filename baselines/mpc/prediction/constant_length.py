@@ -27,31 +27,35 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.mpc.prediction.problem import Horizon
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
+from crane_env.parameters import CraneParameters
+
+# Axes of the coefficients: function of time, response, residual. COS and SIN are neighbours, so
+# that one complex number holds both.
+ONE, TIME, COS, SIN = range(4)
+PULSE, STEP, FREE = range(3)
+TRACKING, SWAY = range(2)
 
 
 class PendulumPrediction:
     """Residuals of eq. (6) over the horizon, as an affine function of the moves.
 
     Args:
-        gravity: g [m/s^2].
-        period: control period T [s].
+        crane: gravity and control period.
         settings: horizons, tail, sway term and sway weight.
     """
 
-    def __init__(self, gravity: float, period: float, settings: MpcSettings) -> None:
-        self._gravity = gravity
-        self._period = period
-        self._sway_gain = math.sqrt(settings.cost.sway_weight)
-        self._sway_is_displacement = settings.cost.sway_term == "displacement"
-        self._sway_has_reference = settings.cost.sway_term == "printed"
+    def __init__(self, crane: CraneParameters, settings: MpcSettings) -> None:
+        self._horizon = Horizon.of(crane, settings)
 
         # At time 0 all functions are 0, also 1 and cos: there, no response has arrived yet.
-        self._functions = np.zeros((settings.prediction_horizon + 1, 4))
+        steps = self._horizon.periods + 1
+        self._functions = np.zeros((steps, 4))
         self._functions[1:, ONE] = 1.0
-        self._functions[:, TIME] = period * np.arange(settings.prediction_horizon + 1)
-        self._layout = _layout(settings)
+        self._functions[:, TIME] = crane.control_period * np.arange(steps)
+        self._layout = _layout(self._horizon, settings.control_horizon)
 
     def residuals(self, cable_length: float, observation: Observation) -> NDArray[np.float64]:
         """Residuals of the plan u: r = R' (u_0, ..., u_{N_c - 1}, 1).
@@ -65,10 +69,11 @@ class PendulumPrediction:
             come in pairs, y - w [m/s] and sqrt(lambda_1) d with the sway term d, at steps
             1 ... N_p; the squares of r sum to the first two sums of eq. (6).
         """
-        length, gravity, period = cable_length, self._gravity, self._period
+        horizon, length = self._horizon, cable_length
+        gravity, period = horizon.gravity, horizon.period
         _, velocity, _, _, sway, sway_rate, reference, _ = observation
         omega = math.sqrt(gravity / length)
-        weight = self._sway_gain * (length if self._sway_is_displacement else 1.0)
+        weight = horizon.displacement_gain * length + horizon.angle_gain
 
         # cos and sin as the powers of exp(i omega T), a third cheaper and as good to 1e-14.
         turn = omega * period
@@ -97,27 +102,18 @@ class PendulumPrediction:
         c[SIN, FREE, TRACKING] = -length * omega * sway
         c[COS, FREE, SWAY] = weight * sway
         c[SIN, FREE, SWAY] = weight * sway_rate / omega
-        if self._sway_has_reference:
-            c[ONE, FREE, SWAY] = -weight * reference
+        c[ONE, FREE, SWAY] = -horizon.reference_gain * reference
 
         pairs: NDArray[np.float64] = np.dot(functions, c.reshape(4, 6)).reshape(-1, 2)
         return pairs.take(self._layout, axis=0).reshape(len(self._layout), -1)
 
 
-def _layout(settings: MpcSettings) -> NDArray[np.intp]:
+def _layout(horizon: Horizon, moves: int) -> NDArray[np.intp]:
     """Which of the (time, response) pairs goes where in R, shape (N_c + 1, N_p)."""
-    moves = settings.control_horizon
     response = np.array([PULSE] * moves + [FREE])
-    if settings.tail == "hold":
+    if horizon.tail_gain:
         response[moves - 1] = STEP
     delay = np.array([*range(moves), 0])
-    steps = np.arange(1, settings.prediction_horizon + 1)
+    steps = np.arange(1, horizon.periods + 1)
     pair: NDArray[np.intp] = np.maximum(steps - delay[:, None], 0) * 3 + response[:, None]
     return pair
-
-
-# Axes of the coefficients: function of time, response, residual. COS and SIN are neighbours, so
-# that one complex number holds both.
-ONE, TIME, COS, SIN = range(4)
-PULSE, STEP, FREE = range(3)
-TRACKING, SWAY = range(2)

@@ -44,19 +44,19 @@ class Horizon(NamedTuple):
     @classmethod
     def of(cls, crane: CraneParameters, settings: MpcSettings) -> Horizon:
         """The horizon that the settings ask for on this crane."""
-        gain = math.sqrt(settings.cost.sway_weight)
-        term = settings.cost.sway_term
+        cost = settings.cost
+        gain = math.sqrt(cost.sway_weight)
         return cls(
             periods=settings.prediction_horizon,
             period=crane.control_period,
             gravity=crane.gravity,
             length_min=crane.cable_length_min,
             length_max=crane.cable_length_max,
-            tail_gain=1.0 if settings.tail == "hold" else 0.0,
-            displacement_gain=gain if term == "displacement" else 0.0,
-            angle_gain=0.0 if term == "displacement" else gain,
-            reference_gain=gain if term == "printed" else 0.0,
-            move_gain=math.sqrt(settings.cost.acceleration_weight),
+            tail_gain=settings.tail_gain,
+            displacement_gain=gain * cost.sway(1.0, 0.0, 0.0),
+            angle_gain=gain * cost.sway(0.0, 1.0, 0.0),
+            reference_gain=-gain * cost.sway(0.0, 0.0, 1.0),
+            move_gain=math.sqrt(cost.acceleration_weight),
         )
 
 

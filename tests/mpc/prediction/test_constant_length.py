@@ -33,7 +33,7 @@ def predict(
     problem: MpcSettings, length: float, start: Observation, moves: np.ndarray
 ) -> np.ndarray:
     """Tracking and sway residuals of a plan, shape (2, N_p)."""
-    prediction = PendulumPrediction(CRANE.gravity, CRANE.control_period, problem)
+    prediction = PendulumPrediction(CRANE, problem)
     matrix = prediction.residuals(length, start)
     residuals: np.ndarray = (matrix.T @ np.append(moves, 1.0)).reshape(-1, 2).T
     return residuals

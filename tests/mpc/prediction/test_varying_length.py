@@ -121,7 +121,7 @@ def test_free_sway_on_a_hoisting_cable_is_bessels(rate: float) -> None:
 @pytest.mark.parametrize("tail", TAILS)
 def test_on_a_cable_at_rest_it_is_the_adaptive_prediction(tail: str, term: str) -> None:
     problem = MpcSettings(tail=tail, cost={"sway_term": term, "sway_weight": 0.7})
-    pendulum = PendulumPrediction(G, CRANE.control_period, problem)
+    pendulum = PendulumPrediction(CRANE, problem)
     varying = TimeVaryingPrediction(CRANE, problem)
     rng = np.random.default_rng(4)
     for _ in range(20):
