@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import numpy as np
@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from crane_env.episode.metrics import Metrics, after_release, integral_absolute_error
 from crane_env.parameters import CraneParameters
+from crane_env.support import checks
 from crane_env.support.atomic_file import atomic_file
-from crane_env.support.checks import whole
 from crane_env.support.extras import require
 
 FORMAT = "oilcrane-trajectory-2"
 """Version of the Parquet layout."""
+
+KEPT_APART = ("parameters", "solver_failures", "simulation_failed")
+"""What is no column of the table, but JSON among its metadata."""
 
 SPEED_TOLERANCE = 0.02
 """The trolley may exceed its setpoint by this much while its drive settles [m/s]."""
@@ -125,7 +128,7 @@ class Trajectory:
         """
         return require("pandas", extra="results").DataFrame(self.columns())
 
-    def to_parquet(self, path: str | os.PathLike[str]) -> None:
+    def to_parquet(self, path: str | Path) -> None:
         """Writes the trajectory; the file appears whole or not at all.
 
         Each column's metadata have its `unit`.
@@ -136,11 +139,8 @@ class Trajectory:
         """
         pyarrow = require("pyarrow", extra="results")
         parquet = require("pyarrow.parquet", extra="results")
-        metadata = {
-            "format": FORMAT,
-            "parameters": json.dumps(dataclasses.asdict(self.parameters)),
-            "solver_failures": json.dumps(self.solver_failures),
-            "simulation_failed": json.dumps(self.simulation_failed),
+        metadata = {"format": FORMAT} | {
+            key: json.dumps(getattr(self, key), default=dataclasses.asdict) for key in KEPT_APART
         }
         columns = {name: pyarrow.array(values) for name, values in self.columns().items()}
         schema = pyarrow.schema(
@@ -150,12 +150,12 @@ class Trajectory:
             ],
             metadata=metadata,
         )
-        with atomic_file(path) as partial:
+        with atomic_file(checks.path(path)) as partial:
             table = pyarrow.table(columns, schema=schema)
             parquet.write_table(table, partial, write_page_checksum=True)
 
     @classmethod
-    def from_parquet(cls, path: str | os.PathLike[str]) -> Trajectory:
+    def from_parquet(cls, path: str | Path) -> Trajectory:
         """Reads what `to_parquet` wrote, bit for bit.
 
         Raises:
@@ -165,8 +165,8 @@ class Trajectory:
         """
         pyarrow = require("pyarrow", extra="results")
         parquet = require("pyarrow.parquet", extra="results")
-        name = os.fspath(path)
-        with open(path, "rb") as file:  # noqa: PTH123  a path may be of any kind
+        name = checks.regular_file("trajectory", path)
+        with name.open("rb") as file:
             try:
                 table = parquet.read_table(file, page_checksum_verification=True)
             except (pyarrow.ArrowException, OSError) as error:
@@ -192,11 +192,12 @@ class Trajectory:
                 f"{name} has not the columns of a trajectory; missing or too many: {wrong}."
             )
         try:
+            said = {key: json.loads(metadata[key]) for key in KEPT_APART}
             return cls(
                 **{column: table[column].to_numpy() for column in UNITS},
-                parameters=CraneParameters.of(json.loads(metadata["parameters"])),
-                solver_failures=whole("solver_failures", json.loads(metadata["solver_failures"])),
-                simulation_failed=json.loads(metadata["simulation_failed"]) is True,
+                parameters=CraneParameters.of(said["parameters"]),
+                solver_failures=checks.whole("solver_failures", said["solver_failures"]),
+                simulation_failed=said["simulation_failed"] is True,
             )
         except (KeyError, ValueError) as error:
             raise ValueError(f"{name} is not a whole trajectory: {error}") from error

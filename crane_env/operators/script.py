@@ -31,7 +31,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import stat
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +41,7 @@ import numpy as np
 from crane_env.observation import CraneState
 from crane_env.operators.base import RELEASED, ButtonEvent, Buttons
 from crane_env.parameters import CraneParameters
+from crane_env.support import checks
 from crane_env.support.atomic_file import atomic_file
 from crane_env.support.checks import not_negative, shown
 
@@ -108,7 +108,7 @@ def read_script(path: str | Path) -> ButtonScript:
         ValueError: another ending, a device, pipe or folder, a file that is too large or cannot be
             read, or a malformed script; the message gives file, place and reason.
     """
-    file = Path(path)
+    file = checks.path(path)
     entries = _csv_entries if _ending(file) == ".csv" else _json_entries
     data = _content(file)
     try:
@@ -130,7 +130,7 @@ def write_script(path: str | Path, schedule: Iterable[ButtonEvent]) -> None:
         ValueError: another ending, or an event that a script cannot have.
         OSError: the file cannot be written.
     """
-    file = Path(path)
+    file = checks.path(path)
     as_text = _csv_text if _ending(file) == ".csv" else _json_text
     text = as_text(ButtonScript(schedule).schedule)  # type: ignore[arg-type]
     with atomic_file(file) as partial:
@@ -146,13 +146,7 @@ def _ending(file: Path) -> str:
 
 def _content(file: Path) -> bytes:
     """All of a regular file that is no larger than a script may be."""
-    name = shown(str(file))
-    try:
-        mode = file.stat().st_mode
-    except (OSError, ValueError) as error:
-        raise FileNotFoundError(f"There is no button script {name}.") from error
-    if not stat.S_ISREG(mode):  # to open a pipe, or to read a device, might never end
-        raise ValueError(f"A button script is a regular file, which {name} is not.")
+    name = shown(str(checks.regular_file("button script", file)))
     try:
         with file.open("rb") as opened:
             data = opened.read(LARGEST_FILE + 1)

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 import reprlib
+import stat
 from collections.abc import Callable, Iterable
 from numbers import Integral, Real
+from pathlib import Path
 
 import numpy as np
 
@@ -120,6 +122,38 @@ def choice(name: str, value: object, valid: Iterable[str]) -> str:
     if isinstance(value, str) and value in names:
         return value
     raise ValueError(f"Unknown {name} {shown(value)}; valid: {', '.join(names)}.")
+
+
+def path(value: object) -> Path:
+    """A path, given as one or as text.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    if isinstance(value, (str, Path)):
+        return Path(value)
+    raise ValueError(f"The name of a file must be text or a path, not {shown(value)}.")
+
+
+def regular_file(kind: str, value: object) -> Path:
+    """The path of a file that is there and can be read to its end: no device, pipe or folder.
+
+    Args:
+        kind: what the file should be, for the error, as in "There is no KIND ...".
+        value: what was given.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: it is no regular file, or what was given is no path.
+    """
+    file = path(value)
+    try:
+        mode = file.stat().st_mode
+    except (OSError, ValueError) as error:
+        raise FileNotFoundError(f"There is no {kind} {shown(str(file))}.") from error
+    if not stat.S_ISREG(mode):
+        raise ValueError(f"{shown(str(file))} is no {kind}: it is not a regular file.")
+    return file
 
 
 def _where(name: str, value: object, allowed: str, holds: Callable[[float], bool]) -> float:

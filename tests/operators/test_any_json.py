@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import CraneState
 from crane_env.operators.manoeuvre import RandomManoeuvre
 from crane_env.operators.registry import make_operator
@@ -88,6 +89,9 @@ def test_so_it_is_of_the_programs_themselves(kind: Any, first: Any, second: Any)
         ButtonScript(first, second)
     with contextlib.suppress(ValueError):
         RandomButtons(travel=first, hoist=second)
+    for read in (read_script, Trajectory.from_parquet):
+        with contextlib.suppress(ValueError, FileNotFoundError):
+            read(first)
 
 
 texts = st.one_of(
