@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from crane_env.parameters import CraneParameters
+
+BUFFER_TIME = 0.1
+"""Time in which the buffers at the rails' ends stop a trolley, at most [s]."""
 
 
 class CraneState(NamedTuple):
@@ -59,24 +62,51 @@ class Observation(NamedTuple):
         return cls._make(values)
 
 
+def largest_state(parameters: CraneParameters) -> CraneState:
+    """Magnitudes that no state of the crane exceeds while its simulation is sound.
+
+    Wide enough for a payload that swings over the girder or falls on a slack cable, and for a
+    trolley that yields to its pull as far as the drive is softer than the pendulum.
+    """
+    p = parameters
+    fastest_fall = math.sqrt(4.0 * p.gravity * p.cable_length_max)
+    swing = p.trolley_speed_max + fastest_fall
+    pendulum = 2.0 * math.pi / p.sway_period(p.cable_length_min, trolley_free=True)
+    softness = 1.0 if p.drive_bandwidth == 0.0 else min(1.0, 2.0 * pendulum / p.drive_bandwidth)
+    pulled = 2.0 * softness * fastest_fall * p.payload_mass / (p.payload_mass + p.trolley_mass)
+    trolley = p.trolley_speed_max + max(p.trolley_speed_max, pulled)
+    return CraneState(
+        trolley_position=p.rail_half_length + max(1.0, BUFFER_TIME * trolley),
+        trolley_velocity=trolley,
+        cable_length=2.0 * p.cable_length_max,
+        cable_rate=max(swing, p.trolley_speed_max + 4.0 * p.hoist_speed),
+        sway_angle=math.pi,
+        sway_rate=2.0 * swing / p.cable_length_min,
+    )
+
+
+def is_sound(state: CraneState, largest: CraneState) -> Any:
+    """Whether a state (floats), or each of many (arrays), lies in the observation space."""
+    position, rate, length, length_rate, sway, sway_rate = state
+    # Comparisons with not-a-number are false.
+    return (
+        (abs(position) <= largest[0])
+        & (abs(rate) <= largest[1])
+        & (length >= 0.0)
+        & (length <= largest[2])
+        & (abs(length_rate) <= largest[3])
+        & (abs(sway) <= largest[4])
+        & (abs(sway_rate) <= largest[5])
+    )
+
+
 def observation_space(parameters: CraneParameters) -> Box[np.float64]:
     """Box of all observations that the crane can give, float64, shape (8,).
 
-    The bounds are wide enough for a payload that swings over the girder or falls on a slack cable.
+    A crane whose state would leave it has a diverged simulation; see `largest_state`.
     """
-    fastest_fall = math.sqrt(4.0 * parameters.gravity * parameters.cable_length_max)
-    swing = parameters.trolley_speed_max + fastest_fall
-    high = Observation(
-        trolley_position=parameters.rail_half_length + 1.0,
-        trolley_velocity=2.0 * parameters.trolley_speed_max,
-        cable_length=2.0 * parameters.cable_length_max,
-        cable_rate=swing,
-        sway_angle=math.pi,
-        sway_rate=2.0 * swing / parameters.cable_length_min,
-        travel_reference=parameters.travel_speed,
-        hoist_reference=parameters.hoist_speed,
-    )
-    upper = np.array(high, dtype=np.float64)
+    largest = (*largest_state(parameters), parameters.travel_speed, parameters.hoist_speed)
+    upper = np.array(largest, dtype=np.float64)
     lower = -upper
     lower[Observation._fields.index("cable_length")] = 0.0
     return Box(lower, upper, dtype=np.float64)

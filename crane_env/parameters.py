@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from crane_env.support.checks import choice, not_negative, positive
+from crane_env.support.checks import choice, not_negative, positive, within
 from crane_env.support.fields import from_fields
 
 MAY_BE_ZERO = frozenset(
@@ -27,8 +27,48 @@ MAY_BE_ZERO = frozenset(
 )
 """Quantities that a crane may be without."""
 
+RANGES = {
+    "trolley_mass": (1e-3, 1e8, "kg"),
+    "payload_mass": (1e-3, 1e8, "kg"),
+    "cable_stiffness": (1e-1, 1e12, "N"),
+    "cable_damping": (1e-9, 1e12, "N s"),
+    "trolley_friction": (1e-9, 1e12, "N s/m"),
+    "sway_friction": (1e-9, 1e12, "N m s/rad"),
+    "gravity": (1e-2, 1e3, "m/s^2"),
+    "travel_speed": (1e-6, 1e3, "m/s"),
+    "hoist_speed": (1e-6, 1e3, "m/s"),
+    "hoist_ramp_time": (1e-6, 1e6, "s"),
+    "acceleration_max": (1e-6, 1e3, "m/s^2"),
+    "trolley_speed_max": (1e-6, 1e3, "m/s"),
+    "drive_bandwidth": (1e-3, 1e6, "rad/s"),
+    "cable_length_initial": (1e-2, 1e5, "m"),
+    "cable_length_min": (1e-2, 1e5, "m"),
+    "cable_length_max": (1e-2, 1e5, "m"),
+    "rail_half_length": (1e-2, 1e6, "m"),
+    "limit_switch_margin": (1e-6, 1e6, "m"),
+    "control_period": (1e-4, 10.0, "s"),
+    "physics_step": (1e-6, 1.0, "s"),
+}
+"""Ranges in which numbers and the plant's kinematic coordinates are exact enough for a crane."""
+
 MAX_DRIVE_STEP = 4.0
 """Largest drive bandwidth times physics step; the position loop is integrated explicitly."""
+
+MAX_CABLE_STEP = 1.0
+"""Largest axial frequency of the cable times physics step; stability ends at 2."""
+
+MAX_SWAY_STEP = 0.25
+"""Largest frequency of the pendulum, or of one thrown by the trolley, times physics step."""
+
+MAX_STRAIN = 0.1
+"""Largest stretch of the cable under the payload's weight, as a share of its length."""
+
+MAX_HOISTED_SHARE = 0.2
+"""Largest share of the shortest cable that is hoisted in a control period, for which its gains are
+held."""
+
+MAX_SUBSTEPS = 10_000
+"""Most physics steps in a control period."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +98,8 @@ class CraneParameters:
         rail_half_length: the rails reach from minus to plus this trolley position [m] (assumed).
         limit_switch_margin: the drive stops this far before the rail's end [m] (assumed).
         control_period: T_s [s].
-        physics_step: time step of the simulation [s]; divides `control_period`.
+        physics_step: longest time step of the simulation [s]; the control period is divided into
+            equal steps of no more.
 
     Raises:
         ValueError: a value outside its physical range; the message names it and what is allowed.
@@ -83,13 +124,15 @@ class CraneParameters:
     rail_half_length: float = 20.0
     limit_switch_margin: float = 0.25
     control_period: float = 0.02
-    physics_step: float = 0.002
+    physics_step: float = 0.004
 
     def __post_init__(self) -> None:
         """Refuses values that no crane can have."""
         for field in dataclasses.fields(self):
             check = not_negative if field.name in MAY_BE_ZERO else positive
             number = check(field.name, getattr(self, field.name))
+            if number != 0.0:
+                within(field.name, number, *RANGES[field.name])
             object.__setattr__(self, field.name, number)
         if not self.cable_length_min < self.cable_length_max:
             raise ValueError(
@@ -111,16 +154,44 @@ class CraneParameters:
                 f"limit_switch_margin ({self.limit_switch_margin} m) must be below "
                 f"rail_half_length ({self.rail_half_length} m)."
             )
-        ratio = self.control_period / self.physics_step
-        if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-9 * ratio:
+        self._check_simulation()
+
+    def _check_simulation(self) -> None:
+        """Refuses what the simulation would get wrong."""
+        step, shortest = self.simulation_step, self.cable_length_min
+        if self.substeps > MAX_SUBSTEPS:
             raise ValueError(
-                f"control_period ({self.control_period} s) must be a whole multiple of "
+                f"control_period ({self.control_period} s) must be at most {MAX_SUBSTEPS} times "
                 f"physics_step ({self.physics_step} s)."
             )
-        if self.drive_bandwidth * self.physics_step > MAX_DRIVE_STEP:
+        if self.drive_bandwidth * step > MAX_DRIVE_STEP:
             raise ValueError(
                 f"drive_bandwidth ({self.drive_bandwidth} rad/s) times physics_step "
-                f"({self.physics_step} s) must not exceed {MAX_DRIVE_STEP} for a stable simulation."
+                f"({step:g} s) must not exceed {MAX_DRIVE_STEP} for a stable simulation."
+            )
+        weight = self.payload_mass * self.gravity
+        if weight > MAX_STRAIN * self.cable_stiffness:
+            raise ValueError(
+                f"cable_stiffness ({self.cable_stiffness:g} N) must be at least "
+                f"{weight / MAX_STRAIN:g} N, or the payload stretches the cable by more than "
+                f"{MAX_STRAIN:.0%}."
+            )
+        inertia = 1.0 / self.payload_mass + 1.0 / self.trolley_mass
+        unstretched = self.unstretched_length(shortest)
+        axial = math.sqrt(self.cable_stiffness / unstretched * inertia)
+        pendulum = 2.0 * math.pi / self.sway_period(shortest, trolley_free=True)
+        thrown = math.sqrt(self.acceleration_max / shortest)
+        longest = min(MAX_CABLE_STEP / axial, MAX_SWAY_STEP / max(pendulum, thrown))
+        if step > longest:
+            raise ValueError(
+                f"physics_step ({step:g} s) must be at most {longest:.3g} s for a cable of this "
+                f"stiffness and a payload of this mass at the shortest length."
+            )
+        if self.hoist_speed * self.control_period > MAX_HOISTED_SHARE * shortest:
+            raise ValueError(
+                f"hoist_speed ({self.hoist_speed} m/s) must be at most "
+                f"{MAX_HOISTED_SHARE * shortest / self.control_period:g} m/s, so that a control "
+                f"period changes the shortest cable by no more than {MAX_HOISTED_SHARE:.0%}."
             )
 
     @classmethod
@@ -171,7 +242,12 @@ class CraneParameters:
     @property
     def substeps(self) -> int:
         """Physics steps per control period."""
-        return round(self.control_period / self.physics_step)
+        return max(1, math.ceil(self.control_period / self.physics_step - 1e-9))
+
+    @property
+    def simulation_step(self) -> float:
+        """Time step that divides the control period, `physics_step` or a little less [s]."""
+        return self.control_period / self.substeps
 
     @property
     def hoist_acceleration(self) -> float:

@@ -8,6 +8,7 @@ are log-uniform. The four are independent.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -82,15 +83,23 @@ class Randomisation:
         given = ((field.name, getattr(self, field.name)) for field in dataclasses.fields(self))
         return {name: value for name, value in given if value is not None}
 
-    def check(self, parameters: CraneParameters) -> None:
+    def check(self, parameters: CraneParameters) -> list[CraneParameters]:
         """Makes sure that every crane that can be drawn is one.
 
+        Returns:
+            The cranes at the corners of the ranges; without ranges the one given.
+
         Raises:
-            ValueError: an end of a range is out of the crane's limits; the message says which.
+            ValueError: a corner of the ranges is no crane; the message says why.
         """
-        for end in range(2):
-            values = {name: bounds[end] for name, bounds in self.ranges.items()}
-            dataclasses.replace(parameters, **values)
+        cranes = []
+        for corner in itertools.product(*self.ranges.values()):
+            drawn = dict(zip(self.ranges, corner, strict=True))
+            try:
+                cranes.append(dataclasses.replace(parameters, **drawn))
+            except ValueError as error:
+                raise ValueError(f"A randomised crane with {drawn}: {error}") from error
+        return cranes
 
     def draw(self, rng: np.random.Generator, parameters: CraneParameters) -> CraneParameters:
         """Draws a crane; without ranges it is the one given and nothing is drawn.

@@ -15,7 +15,7 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
-from crane_env.observation import CraneState
+from crane_env.observation import CraneState, is_sound, largest_state
 from crane_env.parameters import CraneParameters
 from crane_env.plant.drives import ARRAYS, Drives, Stroke
 from crane_env.plant.outcome import Outcome
@@ -64,7 +64,6 @@ class VectorPlant:
         self._position: NDArray[np.float64] = self._batch.bind("qpos")
         self._velocity: NDArray[np.float64] = self._batch.bind("qvel")
         self._control: NDArray[np.float64] = self._batch.bind("ctrl")
-        self._warnings: NDArray[np.int32] = self._batch.warning
         cable = model.actuator("cable").id
         self._cable_gains: NDArray[np.float64] = self._batch.expand("actuator_biasprm")[
             :, cable, :3
@@ -77,6 +76,7 @@ class VectorPlant:
         )
         self._drives = Drives(cranes[0], self._drum_stroke, ARRAYS)
         self._substeps = cranes[0].substeps
+        self._largest = largest_state(cranes[0])
         everyone = np.arange(len(cranes))
         self.exchange(everyone, cranes)
         self.reset(everyone, [AT_REST] * len(cranes))
@@ -146,10 +146,22 @@ class VectorPlant:
             start.coordinates(self.cranes[index])
             for index, start in zip(indices.tolist(), starts, strict=True)
         ]
+        position = np.array([place.position for place in places])
+        velocity = np.array([place.velocity for place in places])
+        self._put(indices, position, velocity, position[:, DRUM])
+
+    def _put(
+        self,
+        indices: NDArray[np.intp],
+        position: NDArray[np.float64],
+        velocity: NDArray[np.float64],
+        gains_length: NDArray[np.float64],
+    ) -> None:
         self._batch.reset(indices, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        self._position[indices] = [place.position for place in places]
-        self._velocity[indices] = [place.velocity for place in places]
-        gains = cable_gains(self._stiffness[indices], self._damping, self._position[indices, DRUM])
+        self._batch.warning[indices] = 1  # see `Plant`
+        self._position[indices] = position
+        self._velocity[indices] = velocity
+        gains = cable_gains(self._stiffness[indices], self._damping, gains_length)
         for column, gain in enumerate(gains):
             self._cable_gains[indices, column] = gain
         self._batch.forward(indices)
@@ -177,18 +189,18 @@ class VectorPlant:
         gains = cable_gains(self._stiffness, self._damping, hoist.middle)
         for column, gain in enumerate(gains):
             np.copyto(self._cable_gains[:, column], gain, where=moving)
-        failed = np.zeros(len(self), dtype=np.bool_)
+        broken = np.zeros(len(self), dtype=np.bool_)
         try:
             self._batch.step(moving, self._substeps)
         except SimulationError as error:
-            failed[error.ids] = True
-        if self._warnings.any():
-            # MuJoCo counts a diverged state and goes on from the model's origin.
-            failed |= moving & self._warnings.any(axis=(1, 2))
+            broken[error.ids] = True
+        state, tension = self.measure()
+        failed = moving & ~(is_sound(state, self._largest) & ~broken)
         if failed.any():
-            self._position[failed] = position[failed]
-            self._velocity[failed] = velocity[failed]
-        return Outcome(*self.measure(), travel.acceleration, travel.limited, failed)
+            indices = np.flatnonzero(failed)
+            self._put(indices, position[failed], velocity[failed], position[failed, DRUM])
+            state, tension = self.measure()
+        return Outcome(state, tension, travel.acceleration, travel.limited, failed)
 
     def measure(self) -> tuple[CraneState, NDArray[np.float64]]:
         """Motion of each crane now, and the tensions of the cables [N], arrays of shape (N,)."""

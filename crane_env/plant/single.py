@@ -20,6 +20,7 @@ are at most 1 % off, at the shortest cable.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
@@ -27,7 +28,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from crane_env.observation import CraneState
+from crane_env.observation import CraneState, is_sound, largest_state
 from crane_env.parameters import CraneParameters
 from crane_env.plant.drives import Drives, Stroke
 from crane_env.plant.outcome import Outcome
@@ -36,18 +37,23 @@ from crane_env.plant.start import AT_REST, Start
 SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
 """Places of the joints among positions and velocities."""
 
+SLACKEST_REACH = 0.3
+"""Share of the shortest cable length at which a payload that flies up meets the sheave."""
+
 
 def build_model(parameters: CraneParameters) -> mujoco.MjModel:
     """MuJoCo model of the crane with these parameters."""
     path = resources.files("crane_env.plant") / "crane.xml"
     model = mujoco.MjModel.from_xml_string(path.read_text(encoding="utf-8"))
-    model.opt.timestep = parameters.physics_step
+    model.opt.timestep = parameters.control_period / parameters.substeps
     model.opt.gravity[2] = -parameters.gravity
     model.body("trolley").mass[0] = parameters.trolley_mass
     model.body("payload").mass[0] = parameters.payload_mass
     rail = model.tendon("rail").id
     model.tendon_damping[rail] = parameters.trolley_friction
     model.tendon_range[rail] = (-parameters.rail_half_length, parameters.rail_half_length)
+    shortest, longest = parameters.cable_length_min, parameters.cable_length_max
+    model.joint("reach").range = (SLACKEST_REACH * shortest, 2.0 * longest)
     model.joint("sway").damping[0] = parameters.sway_friction
     position_loop, velocity_loop = drive_loops(parameters)
     model.joint("drive_error").stiffness[0] = position_loop
@@ -108,6 +114,7 @@ class Plant:
         self._cable_gains = model.actuator_biasprm[cable, :3]
         self._drives = Drives(parameters, drum_stroke(parameters))
         self._substeps = parameters.substeps
+        self._largest = largest_state(parameters)
 
     def __getstate__(self) -> dict[str, object]:
         """Parameters and full integration state: a copy continues bit for bit."""
@@ -130,10 +137,18 @@ class Plant:
             ValueError: a value outside its range.
         """
         position, velocity = start.coordinates(self.parameters)
+        self._put(position, velocity, position[DRUM])
+
+    def _put(
+        self, position: Sequence[float], velocity: Sequence[float], gains_length: float
+    ) -> None:
         mujoco.mj_resetData(self.model, self.data)
+        # A diverged state is data, not a warning on the screen and in a file: MuJoCo tells the
+        # first of a kind only.
+        self.data.warning.number[:] = 1
         self._position[:] = position
         self._velocity[:] = velocity
-        self._set_cable_gains(position[DRUM])
+        self._set_cable_gains(gains_length)
         mujoco.mj_forward(self.model, self.data)
 
     def step(self, acceleration: float, hoist_reference: float) -> Outcome:
@@ -145,7 +160,6 @@ class Plant:
         """
         position, velocity = self._position.tolist(), self._velocity.tolist()
         drum, drum_rate = position[DRUM], velocity[DRUM]
-        data, begin = self.data, self.data.time
         travel = self._drives.travel(position[SETPOINT], velocity[SETPOINT], acceleration)
         hoist_acceleration, drum_middle = 0.0, drum
         if hoist_reference or drum_rate:  # else the hoist stays at rest, as it is most of the time
@@ -155,13 +169,15 @@ class Plant:
         self._control[0] = travel.acceleration
         self._control[1] = hoist_acceleration
         self._set_cable_gains(drum_middle)
-        mujoco.mj_step(self.model, data, nstep=self._substeps)
-        failed = data.time <= begin
+        mujoco.mj_step(self.model, self.data, nstep=self._substeps)
+        state, tension = self.measure()
+        failed = not is_sound(state, self._largest)
         if failed:
-            # MuJoCo has counted a diverged state and gone on from the model's origin at time 0.
-            self._position[:], self._velocity[:], data.time = position, velocity, begin
-            mujoco.mj_forward(self.model, data)
-        return Outcome(*self.measure(), travel.acceleration, travel.limited, failed)
+            begin = self.data.time - self.parameters.control_period
+            self._put(position, velocity, drum)
+            self.data.time = begin
+            state, tension = self.measure()
+        return Outcome(state, tension, travel.acceleration, travel.limited, failed)
 
     def _set_cable_gains(self, unstretched_length: float) -> None:
         parameters = self.parameters

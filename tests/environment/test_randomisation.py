@@ -17,8 +17,8 @@ PAPER = CraneParameters.paper()
 WIDE = Randomisation(
     payload_mass=(50.0, 200.0),
     cable_length_initial=(2.0, 12.0),
-    cable_stiffness=(1e5, 1e7),
-    drive_bandwidth=(20.0, 2000.0),
+    cable_stiffness=(1e5, 2e6),
+    drive_bandwidth=(10.0, 1000.0),
 )
 
 
@@ -72,6 +72,10 @@ def test_what_is_no_randomisation_is_refused() -> None:
         ({"cable_length_initial": (0.5, 3.0)}, r"cable_length_initial \(0.5 m\)"),
         ({"cable_length_initial": (3.0, 13.0)}, r"cable_length_initial \(13.0 m\)"),
         ({"drive_bandwidth": (30.0, 1e4)}, "drive_bandwidth .* must not exceed"),
+        (
+            {"payload_mass": (30.0, 200.0), "cable_stiffness": (1e5, 3e6)},
+            "'payload_mass': 30.0, 'cable_stiffness': 3000000.0.*: physics_step .* at most",
+        ),
     ],
 )
 def test_cranes_that_cannot_be_are_refused_before_one_is_drawn(

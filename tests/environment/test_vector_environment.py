@@ -32,7 +32,7 @@ MODES = list(AutoresetMode)
 RANGES = Randomisation(
     payload_mass=(50.0, 300.0),
     cable_length_initial=(3.0, 11.0),
-    cable_stiffness=(4e5, 4e6),
+    cable_stiffness=(2e5, 2e6),
     drive_bandwidth=(30.0, 1000.0),
 )
 Vector = VectorEnv[Any, Any, Any]
