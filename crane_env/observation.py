@@ -100,13 +100,14 @@ def is_sound(state: CraneState, largest: CraneState) -> Any:
     )
 
 
-def observation_space(parameters: CraneParameters) -> Box[np.float64]:
-    """Box of all observations that the crane can give, float64, shape (8,).
+def observation_space(*cranes: CraneParameters) -> Box[np.float64]:
+    """Box of all observations that these cranes can give, float64, shape (8,).
 
-    A crane whose state would leave it has a diverged simulation; see `largest_state`.
+    A crane whose state would leave its own has a diverged simulation; see `largest_state`.
     """
-    largest = (*largest_state(parameters), parameters.travel_speed, parameters.hoist_speed)
-    upper = np.array(largest, dtype=np.float64)
+    upper = np.max(
+        [(*largest_state(crane), crane.travel_speed, crane.hoist_speed) for crane in cranes], axis=0
+    )
     lower = -upper
     lower[Observation._fields.index("cable_length")] = 0.0
     return Box(lower, upper, dtype=np.float64)

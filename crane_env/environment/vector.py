@@ -140,8 +140,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self.cost = StageCost.of(cost)
         self.randomisation = Randomisation.of(randomisation)
         self._own_parameters = _cranes(parameters, self.num_envs)
-        for crane in set(self._own_parameters):
-            self.randomisation.check(crane)
+        possible = [
+            corner
+            for crane in set(self._own_parameters)
+            for corner in self.randomisation.check(crane)
+        ]
         self.parameters = self._own_parameters[0]
         self.plant = VectorPlant(self._own_parameters, threads=threads)
         self._default_operators = make_operators(operator, self.num_envs)
@@ -155,7 +158,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         }
         limit = self.parameters.acceleration_max
         self.single_action_space = Box(-limit, limit, (1,), dtype=np.float32)
-        self.single_observation_space = observation_space(self.parameters)
+        self.single_observation_space = observation_space(*possible)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 

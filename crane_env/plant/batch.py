@@ -76,7 +76,9 @@ class VectorPlant:
         )
         self._drives = Drives(cranes[0], self._drum_stroke, ARRAYS)
         self._substeps = cranes[0].substeps
-        self._largest = largest_state(cranes[0])
+        self._largest: Any = CraneState(
+            *(np.full(len(cranes), bound) for bound in largest_state(cranes[0]))
+        )
         everyone = np.arange(len(cranes))
         self.exchange(everyone, cranes)
         self.reset(everyone, [AT_REST] * len(cranes))
@@ -128,6 +130,8 @@ class VectorPlant:
             stroke = drum_stroke(crane)
             self._drum_stroke.centre[index] = stroke.centre
             self._drum_stroke.half[index] = stroke.half
+            for bounds, bound in zip(self._largest, largest_state(crane), strict=True):
+                bounds[index] = bound
             self.cranes[index] = crane
         if heavier:
             self._batch.set_const(heavier)
