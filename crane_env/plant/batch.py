@@ -76,8 +76,8 @@ class VectorPlant:
         )
         self._drives = Drives(cranes[0], self._drum_stroke, ARRAYS)
         self._substeps = cranes[0].substeps
-        self._largest: Any = CraneState(
-            *(np.full(len(cranes), bound) for bound in largest_state(cranes[0]))
+        self._largest: Any = CraneState._make(
+            np.full(len(cranes), bound) for bound in largest_state(cranes[0])
         )
         everyone = np.arange(len(cranes))
         self.exchange(everyone, cranes)
