@@ -241,7 +241,7 @@ def _delimiter(text: str) -> str:
     """What separates the columns: of the header, the first line that says anything."""
     lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
     header = next(lines, "")
-    return next((mark for mark in ";\t" if mark in header), ",")
+    return next((mark for mark in ",;\t" if mark in header), ",")
 
 
 def _csv_columns(cells: list[str], where: str) -> list[str]:
