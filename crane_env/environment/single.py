@@ -16,7 +16,7 @@ from crane_env.environment.pictures import Pictures
 from crane_env.environment.report import StepRecord, report_period, report_start
 from crane_env.observation import CraneState, Observation, observation_space
 from crane_env.operators.base import RELEASED, Buttons, Operator
-from crane_env.operators.registry import OperatorSpec, make_operator
+from crane_env.operators.registry import OperatorSpec, own_operator
 from crane_env.parameters import CraneParameters
 from crane_env.plant.single import Plant
 from crane_env.stage_cost import StageCost
@@ -105,7 +105,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
 
     Args:
         operator: who presses the buttons: "random", "manoeuvre", "table1:3", "script:FILE", a
-            program, a list of `ButtonEvent`s or an operator object.
+            program, a list of `ButtonEvent`s or an operator object, of which it makes a copy.
         parameters: `CraneParameters`, a mapping of its fields, or a preset ("paper", "field").
         cost: weights of the stage cost; `StageCost` or a mapping of its fields.
         render_mode: None, "human" (a window) or "rgb_array" (a picture from `render`).
@@ -142,7 +142,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         limit = self.parameters.acceleration_max
         self.action_space = Box(-limit, limit, (1,), dtype=np.float32)
         self.observation_space = observation_space(self.parameters)
-        self._default_operator = make_operator(operator)
+        self._default_operator = own_operator(operator)
         self._operator = self._default_operator
         self._step_index = 0
         self._press(RELEASED)
@@ -178,7 +178,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         check_names(placed, "operator")
         operator = self._default_operator
         if "operator" in placed:
-            operator = make_operator(placed.pop("operator"))
+            operator = own_operator(placed.pop("operator"))
         start = start_of(placed)
         start.coordinates(self.parameters)
         super().reset(seed=seed)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import copy
 import dataclasses
 import json
+import math
 import pickle
 from decimal import ROUND_CEILING, Decimal
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from hypothesis import given
@@ -18,7 +20,7 @@ from hypothesis import strategies as st
 from crane_env.observation import CraneState
 from crane_env.operators.base import RELEASED, ButtonEvent, Buttons, ScheduledOperator
 from crane_env.operators.manoeuvre import RandomManoeuvre
-from crane_env.operators.registry import make_operator
+from crane_env.operators.registry import make_operator, own_operator
 from crane_env.operators.script import ButtonScript, write_script
 from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
 from crane_env.operators.table1 import Table1Manoeuvre
@@ -98,18 +100,58 @@ def test_a_mapping_may_give_some_fields_only() -> None:
     assert program == RandomButtons(hoist=expected)
 
 
+class EverySecond:
+    """Presses forward in every other second, as far as it is asked once a control step."""
+
+    def reset(self, rng: Any, start: CraneState, parameters: CraneParameters) -> None:
+        self.steps = 0
+
+    def press(self, time: float, state: CraneState) -> Buttons:
+        self.steps += 1
+        return Buttons(forward=self.steps // 50 % 2 == 1)
+
+
+class Pendant(EverySecond):
+    """There is only one of it."""
+
+    def __deepcopy__(self, memo: Any) -> Pendant:
+        return self
+
+
+class Uncopyable(EverySecond):
+    def __deepcopy__(self, memo: Any) -> Uncopyable:
+        raise TypeError("there can be only one")
+
+
 def test_a_program_is_played_and_an_operator_used_as_it_is() -> None:
-    program = RandomManoeuvre()
+    program, operator = RandomManoeuvre(), EverySecond()
     assert program_of(program) is program
+    assert make_operator(operator) is operator
 
-    class Sleeper:
-        def reset(self, rng: Any, start: CraneState, parameters: CraneParameters) -> None: ...
 
-        def press(self, time: float, state: CraneState) -> Buttons:
-            return RELEASED
+def test_an_environments_own_operator_shares_nothing() -> None:
+    given, scheduled = EverySecond(), make_operator("table1:1")
+    for operator in (given, scheduled):
+        own = own_operator(operator)
+        assert own is not operator
+        own.reset(np.random.default_rng(0), at_rest(PAPER), PAPER)
+    assert not hasattr(given, "steps")
+    assert scheduled.due == math.inf  # type: ignore[attr-defined]
+    assert own_operator(pendant := Pendant()) is pendant
+    with pytest.raises(ValueError, match="cannot be copied: there can be only one"):
+        own_operator(Uncopyable())
 
-    sleeper = Sleeper()
-    assert make_operator(sleeper) is sleeper
+
+@pytest.mark.parametrize("options", [None, {"operator": EverySecond()}])
+def test_environments_that_are_given_one_operator_do_not_share_it(options: Any) -> None:
+    cranes = {} if options else {"operator": EverySecond()}
+    changes = []
+    for count in (1, 4):
+        env: Any = gymnasium.make_vec("OILCrane-v0", count, vectorization_mode="sync", **cranes)
+        env.reset(options=options)
+        references = [env.step(np.zeros((count, 1)))[0][0, 6] for _ in range(120)]
+        changes.append(np.flatnonzero(np.diff(references)).tolist())
+    assert changes[0] == changes[1] == [47, 97]
 
 
 def test_a_sequence_of_events_is_a_script() -> None:
