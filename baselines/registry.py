@@ -9,18 +9,16 @@ its fields, such as `MpcSettings`. A factory of your own may leave the annotatio
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import inspect
-import sysconfig
-import traceback
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller
 from crane_env.parameters import CraneParameters
 from crane_env.support.checks import shown
+from crane_env.support.factory import FactoryError, found_at, is_place, placed_errors
 
 CONTROLLERS: dict[str, str] = {
     "manual": "baselines.manual:manual",
@@ -42,13 +40,6 @@ CONTROLLERS: dict[str, str] = {
     "sac": "baselines.rl.onnx_policy:sac",
 }
 """Name of each controller and where its factory is."""
-
-LIBRARIES = tuple(sysconfig.get_paths()[kind] for kind in ("stdlib", "purelib", "platlib"))
-"""Folders of other people's code: an error of a user's own module is never placed there."""
-
-
-class FactoryError(ValueError):
-    """A controller of the user's own fails while it is imported or built; says where."""
 
 
 def make_controller(
@@ -107,16 +98,15 @@ def settings_type(name: str) -> type | None:
 
 def _factory(name: str) -> Callable[..., Any]:
     place = CONTROLLERS.get(name, name) if isinstance(name, str) else ""
-    module, _, factory = place.partition(":")
-    if not all(part.isidentifier() for part in (*module.split("."), factory)):
+    if not is_place(place):
         raise ValueError(
             f"Unknown controller {shown(name)}; valid: {', '.join(CONTROLLERS)}, or a factory of "
             "your own as package.module:factory."
         )
     with _placed_errors(name):
-        build = getattr(importlib.import_module(module), factory, None)
+        build = found_at(place)
     if not callable(build):
-        raise ValueError(f"The module {module!r} has no controller factory {factory!r}.")
+        raise ValueError(f"There is no controller factory at {place!r}.")
     return build  # type: ignore[no-any-return]
 
 
@@ -140,25 +130,5 @@ def _settings_type(name: str, build: Callable[..., Any]) -> Any:
     )
 
 
-@contextmanager
-def _placed_errors(name: str) -> Iterator[None]:
-    """Makes one sentence, with file and line, of whatever a user's own code raises."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        raise ImportError(f"The controller {name!r} cannot be imported: {error}.") from error
-    except (Exception, SystemExit) as error:
-        if name in CONTROLLERS:
-            raise
-        kind = ImportError if isinstance(error, ImportError) else FactoryError
-        what = " ".join(f"{type(error).__name__}: {error}".split())
-        raise kind(f"The controller {name!r} fails with {what} ({_place(error)}).") from error
-
-
-def _place(error: BaseException) -> str:
-    if isinstance(error, SyntaxError) and error.filename:
-        return f"{error.filename}, line {error.lineno}"
-    frames = traceback.extract_tb(error.__traceback__)
-    own = [f for f in frames if not f.filename.startswith(("<", __file__, *LIBRARIES))]
-    last = (own or frames)[-1]
-    return f"{last.filename}, line {last.lineno}"
+def _placed_errors(name: str) -> AbstractContextManager[None]:
+    return nullcontext() if name in CONTROLLERS else placed_errors(f"controller {name!r}")

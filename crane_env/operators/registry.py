@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +13,7 @@ from crane_env.operators.script import ButtonScript, read_script
 from crane_env.operators.semi_markov import RandomButtons
 from crane_env.operators.table1 import TABLE_1, Table1Manoeuvre
 from crane_env.support.checks import shown
+from crane_env.support.factory import FactoryError, found_at, is_place, placed_errors
 from crane_env.support.fields import with_fields
 
 OperatorSpec = str | Mapping[str, Any] | Program | Operator | Sequence[ButtonEvent]
@@ -20,7 +22,11 @@ OperatorSpec = str | Mapping[str, Any] | Program | Operator | Sequence[ButtonEve
 TABLE_1_NUMBERS = [str(number) for number in range(1, len(TABLE_1) + 1)]
 """What may follow "table1:"."""
 
-VALID_NAMES = f"random, manoeuvre, table1:1 … table1:{len(TABLE_1)}, script:FILE"
+VALID_NAMES = (
+    f"random, manoeuvre, table1:1 … table1:{len(TABLE_1)}, script:FILE, package.module:factory"
+)
+FAMILIES = ("random", "manoeuvre", "table1", "script")
+"""What the names of operators begin with; no module of a factory is looked for under these."""
 
 
 def make_operator(spec: OperatorSpec) -> Operator:
@@ -28,35 +34,44 @@ def make_operator(spec: OperatorSpec) -> Operator:
 
     Args:
         spec: a name: "random" (see `RandomButtons`), "manoeuvre" (`RandomManoeuvre`), "table1:1" to
-            "table1:10" (`Table1Manoeuvre`), "script:FILE" (`ButtonScript`);
-            a mapping of a name and fields of that program, as `dataclasses.asdict` makes it;
-            a program; an operator, which is returned as it is; or a sequence of `ButtonEvent`s.
+            "table1:10" (`Table1Manoeuvre`), "script:FILE" (`ButtonScript`), or
+            "package.module:factory", a function of your own that takes nothing and returns a
+            program or an operator; a mapping of a name and fields of that program, as
+            `dataclasses.asdict` makes it; a program; an operator, which is returned as it is; or a
+            sequence of `ButtonEvent`s.
 
     Raises:
         ValueError: an unknown name (the message lists the valid ones) or field, a value out of
             range, a malformed script, or something that is no operator at all.
         FileNotFoundError: there is no such script.
+        ImportError: the module of a factory of your own cannot be imported.
     """
     given: Any = spec
     if isinstance(given, str):
-        return ScheduledOperator(_program(given, {}))
-    if isinstance(given, Mapping):
+        given = _program(given, {})
+    elif isinstance(given, Mapping):
         fields = dict(given)
         if "name" not in fields:
             raise ValueError(f"An operator's mapping needs a 'name', one of: {VALID_NAMES}.")
-        return ScheduledOperator(_program(fields.pop("name"), fields))
-    if isinstance(given, Sequence):
-        return ScheduledOperator(ButtonScript(tuple(given)))
-    if not isinstance(given, type):
-        if hasattr(given, "reset") and hasattr(given, "press"):
-            operator: Operator = given
-            return operator
-        if hasattr(given, "events"):
-            return ScheduledOperator(given)
+        given = _program(fields.pop("name"), fields)
+    elif isinstance(given, Sequence):
+        given = ButtonScript(tuple(given))
+    if _presses(given):
+        return given  # type: ignore[no-any-return]
+    if _is_program(given):
+        return ScheduledOperator(given)
     raise ValueError(
-        f"An operator is a name ({VALID_NAMES}), a mapping with a name, a program, an operator or "
-        f"a sequence of button events, not {shown(given)}."
+        f"An operator is a name ({VALID_NAMES}), a mapping with a name, a program, an "
+        f"operator or a sequence of button events, not {shown(given)}."
     )
+
+
+def _presses(given: Any) -> bool:
+    return not isinstance(given, type) and hasattr(given, "reset") and hasattr(given, "press")
+
+
+def _is_program(given: Any) -> bool:
+    return not isinstance(given, type) and hasattr(given, "events")
 
 
 def own_operator(spec: OperatorSpec) -> Operator:
@@ -82,7 +97,9 @@ def own_operator(spec: OperatorSpec) -> Operator:
         ) from error
 
 
-def _program(name: object, fields: Mapping[str, Any]) -> Program:
+def _program(name: object, fields: Mapping[str, Any]) -> Any:
+    """The program of a name with some fields replaced; an operator where a factory made one."""
+    own = False
     program: Any
     match str(name).partition(":"):
         case "random", "", "":
@@ -95,13 +112,31 @@ def _program(name: object, fields: Mapping[str, Any]) -> Program:
             program = ButtonScript((), str(name))
         case "script", ":", file if file:
             program = read_script(file)
+        case head, _, _ if head not in FAMILIES and is_place(name):
+            program, own = _of_factory(str(name)), True
         case _:
             raise ValueError(f"Unknown operator {shown(name)}; valid: {VALID_NAMES}.")
-    restored: Program = with_fields(
+    if own and not fields:
+        return program
+    if not dataclasses.is_dataclass(program):
+        raise ValueError(f"The operator {shown(name)} has no fields that could be given.")
+    restored: Any = with_fields(
         program, fields, must_be="Fields must be a mapping", unknown=f"{str(name)!r} field"
     )
-    if restored.name != name:
+    if not own and restored.name != name:
         raise ValueError(
             f"The fields of operator {shown(name)} are those of {shown(restored.name)}."
         )
     return restored
+
+
+def _of_factory(place: str) -> Any:
+    with placed_errors(f"operator {place!r}"):
+        build = found_at(place)
+        made = build() if callable(build) else None
+    if not _presses(made) and not _is_program(made):
+        raise FactoryError(
+            f"The factory of {place!r} must return a program, an object with events(rng, start, "
+            f"parameters), or an operator, with reset and press, not {shown(made)}."
+        )
+    return made

@@ -29,7 +29,7 @@ from tests.mpc.nominal_crane import at_rest
 
 PAPER = CraneParameters.paper()
 PRESSED = Buttons(forward=True)
-VALID = "random, manoeuvre, table1:1 … table1:10, script:FILE"
+VALID = "random, manoeuvre, table1:1 … table1:10, script:FILE, package.module:factory"
 
 PROGRAMS = [
     RandomButtons(),
@@ -109,6 +109,36 @@ class EverySecond:
     def press(self, time: float, state: CraneState) -> Buttons:
         self.steps += 1
         return Buttons(forward=self.steps // 50 % 2 == 1)
+
+
+def seldom() -> RandomButtons:
+    return RandomButtons(travel=ButtonHabits(pause_median=20.0))
+
+
+def nobody() -> None:
+    return None
+
+
+def leaving() -> None:
+    raise SystemExit(3)
+
+
+def test_an_operator_or_program_of_the_users_own_comes_by_its_factorys_place() -> None:
+    assert isinstance(make_operator(f"{__name__}:EverySecond"), EverySecond)
+    assert program_of(f"{__name__}:seldom") == seldom()
+    mapping = {**dataclasses.asdict(seldom()), "name": f"{__name__}:seldom"}
+    assert program_of(json.loads(json.dumps(mapping))) == seldom()
+    for factory, reason in (
+        ("nobody", "must return a program, .* not None"),
+        ("missing", "must return a program, .* not None"),
+        ("leaving", r"fails with SystemExit: 3 \(.*test_operators.py, line \d+\)"),
+    ):
+        with pytest.raises(ValueError, match=reason):
+            make_operator(f"{__name__}:{factory}")
+    with pytest.raises(ValueError, match="has no fields"):
+        make_operator({"name": f"{__name__}:EverySecond", "steps": 3})
+    with pytest.raises(ImportError, match="operator 'no_such_module:build' cannot be imported"):
+        make_operator("no_such_module:build")
 
 
 class Pendant(EverySecond):

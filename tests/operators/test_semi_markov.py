@@ -21,7 +21,7 @@ from tests.mpc.nominal_crane import at_rest, drawn, nominal_motion
 
 PAPER = CraneParameters.paper()
 ENDLESS = CraneParameters(
-    rail_half_length=1e9, cable_length_max=1e9, cable_length_initial=5e8, control_period=0.02
+    rail_half_length=1e5, cable_length_max=1e5, cable_length_initial=5e4, control_period=0.02
 )
 """A crane on which no press meets a limit."""
 
