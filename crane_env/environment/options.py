@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from numbers import Integral
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,8 @@ from numpy.typing import NDArray
 
 from crane_env.parameters import CraneParameters
 from crane_env.plant.start import Start
-from crane_env.support.checks import choice, real
+from crane_env.support import checks
+from crane_env.support.checks import choice, real, shown
 
 
 def start_of(options: Mapping[str, Any]) -> Start:
@@ -23,14 +23,19 @@ def start_of(options: Mapping[str, Any]) -> Start:
     return Start(**{name: real(name, value) for name, value in options.items()})
 
 
-def check_names(options: Mapping[str, Any], *others: str) -> None:
-    """Makes sure that options of `reset` are fields of `Start` or one of some others.
+def read_options(options: object, *others: str) -> dict[str, Any]:
+    """Options of `reset`, of which each is a field of `Start` or one of some others.
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: something else, or an unknown name.
     """
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        raise ValueError(f"Reset options must be a mapping, not {shown(options)}.")
     for name in options:
         choice("reset option", name, (*Start._fields, *others))
+    return dict(options)
 
 
 def starts_of_each(
@@ -85,20 +90,18 @@ def chosen_by(mask: object, count: int) -> NDArray[np.bool_]:
     return mask.copy()
 
 
-def seeds_of_each(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
-    """The seed of each crane: seed + i, entry i of a list, or None.
+def seeds_of_each(seed: object, count: int) -> list[int | None]:
+    """The seed of each crane: seed + i, entry i of a sequence, or None.
 
     Raises:
-        ValueError: a list of another length.
+        ValueError: a sequence of another length, or a seed that is none.
     """
-    if seed is None:
-        return [None] * count
-    if isinstance(seed, Integral):
-        return [int(seed) + index for index in range(count)]
-    given: Any = seed
-    seeds = [None if one is None else int(one) for one in given]
-    if len(seeds) != count:
+    if isinstance(seed, np.ndarray):
+        seed = seed.tolist()
+    if not isinstance(seed, (list, tuple)):
+        return [None if seed is None else checks.seed(seed) + index for index in range(count)]
+    if len(seed) != count:
         raise ValueError(
-            f"A list of seeds needs one for each of the {count} environments, not {len(seeds)}."
+            f"A list of seeds needs one for each of the {count} environments, not {len(seed)}."
         )
-    return seeds
+    return [None if one is None else checks.seed(one) for one in seed]

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from crane_env.environment.options import check_names, start_of
+from crane_env.environment.options import read_options, start_of
 from crane_env.environment.pictures import Pictures
 from crane_env.environment.report import StepRecord, report_period, report_start
 from crane_env.observation import CraneState, Observation, observation_space
@@ -20,9 +20,14 @@ from crane_env.operators.registry import OperatorSpec, own_operator
 from crane_env.parameters import CraneParameters
 from crane_env.plant.single import Plant
 from crane_env.stage_cost import StageCost
+from crane_env.support import checks
+from crane_env.support.fixed import fixed
 
 if TYPE_CHECKING:
     from crane_env.rendering.scene import CraneRenderer
+
+
+ANEW = "make a new environment with gymnasium.make"
 
 
 class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
@@ -103,9 +108,16 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     called with a `StepRecord` at the end of every `reset` and `step` of the plant. Copies and
     pickles have no recorder.
 
+    ## In other processes and windows
+
+    A process that did not import `crane_env` knows the environment as "crane_env:OILCrane-v0"
+    (Gymnasium's AsyncVectorEnv, Stable-Baselines3's SubprocVecEnv started by "spawn"). On a screen,
+    use `render_mode="human"`; Gymnasium's `HumanRendering` opens a window of its own beside the
+    OpenGL that draws the picture, which needs MUJOCO_GL=osmesa or glfw under X11.
+
     Args:
         operator: who presses the buttons: "random", "manoeuvre", "table1:3", "script:FILE", a
-            program, a list of `ButtonEvent`s or an operator object, of which it makes a copy.
+            program, a list of `ButtonEvent`s or an operator object, of which it takes a copy.
         parameters: `CraneParameters`, a mapping of its fields, or a preset ("paper", "field").
         cost: weights of the stage cost; `StageCost` or a mapping of its fields.
         render_mode: None, "human" (a window) or "rgb_array" (a picture from `render`).
@@ -133,25 +145,30 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     ) -> None:
         modes = self.metadata["render_modes"]
         self._pictures = Pictures(render_mode, modes, render_width, render_height)
-        self.render_mode = render_mode
-        self.parameters = CraneParameters.of(parameters)
-        self.cost = StageCost.of(cost)
-        self.plant = Plant(self.parameters)
-        frames = round(1.0 / self.parameters.control_period)
+        self._render_mode = render_mode
+        self._parameters = CraneParameters.of(parameters)
+        self._cost = StageCost.of(cost)
+        self._plant = Plant(self._parameters)
+        frames = round(1.0 / self._parameters.control_period)
         self.metadata = {**self.metadata, "render_fps": frames}
-        limit = self.parameters.acceleration_max
+        limit = self._parameters.acceleration_max
         self.action_space = Box(-limit, limit, (1,), dtype=np.float32)
-        self.observation_space = observation_space(self.parameters)
+        self.observation_space = observation_space(self._parameters)
         self._default_operator = own_operator(operator)
         self._operator = self._default_operator
         self._step_index = 0
         self._press(RELEASED)
         self.recorder: Callable[[StepRecord], None] | None = None
 
+    parameters: CraneParameters = fixed("parameters", ANEW, "The crane.")
+    cost: StageCost = fixed("cost", ANEW, "The stage cost that the reward is the negative of.")
+    plant: Plant = fixed("plant", ANEW, "The simulated crane.")
+    render_mode: str | None = fixed("render_mode", ANEW, 'None, "human" or "rgb_array".')
+
     @property
     def time(self) -> float:
         """Time since the reset [s]."""
-        return self._step_index * self.parameters.control_period
+        return self._step_index * self._parameters.control_period
 
     @property
     def operator(self) -> Operator:
@@ -160,7 +177,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
 
     def truth(self) -> Observation:
         """State of the plant and the references now in force, whatever wraps the environment."""
-        return Observation(*self.plant.state(), *self._references)
+        return Observation(*self._plant.state(), *self._references)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -168,28 +185,28 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         """Begins an episode.
 
         Args:
-            seed: seeds the episodes from this one on; the operator is part of them.
+            seed: seeds the episodes from this one on, from 0 to before 2^63; the operator is part
+                of them.
             options: any field of `Start` and `operator`, for this episode only.
 
         Raises:
             ValueError: an unknown option, or a value out of range; the crane stays as it was.
         """
-        placed = dict(options or {})
-        check_names(placed, "operator")
+        placed = read_options(options, "operator")
         operator = self._default_operator
         if "operator" in placed:
             operator = own_operator(placed.pop("operator"))
         start = start_of(placed)
-        start.coordinates(self.parameters)
-        super().reset(seed=seed)
-        self.plant.reset(start)
+        start.coordinates(self._parameters)
+        super().reset(seed=None if seed is None else checks.seed(seed))
+        self._plant.reset(start)
         self._operator = operator
         self._step_index = 0
-        state, tension = self.plant.measure()
+        state, tension = self._plant.measure()
         # The operator draws from a generator of its own: how far one episode was played does not
         # change the next.
         stream = np.random.default_rng(int(self.np_random.integers(2**63)))
-        self._operator.reset(stream, state, self.parameters)
+        self._operator.reset(stream, state, self._parameters)
         self._read_buttons(state)
         info = report_start(state, tension)
         return self._show(state, info, math.nan, 0.0), info
@@ -206,13 +223,13 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
             ValueError: the action has another shape or is not finite; the state stays as it was.
         """
         asked = self._checked(action)
-        limit = self.parameters.acceleration_max
+        limit = self._parameters.acceleration_max
         travel_reference, hoist_reference = self._references
-        outcome = self.plant.step(min(max(asked, -limit), limit), hoist_reference)
+        outcome = self._plant.step(min(max(asked, -limit), limit), hoist_reference)
         self._step_index += 1
         if not outcome.failed:
             self._read_buttons(outcome.state)
-        reward, info = report_period(outcome, asked, travel_reference, self.parameters, self.cost)
+        reward, info = report_period(outcome, asked, travel_reference, self._parameters, self._cost)
         observation = self._show(outcome.state, info, asked, reward)
         return observation, reward, False, outcome.failed, info
 
@@ -233,8 +250,8 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     def _make_renderer(self) -> CraneRenderer:
         from crane_env.rendering.scene import CraneRenderer
 
-        size, window = self._pictures.size, self.render_mode == "human"
-        return CraneRenderer(self.plant, *size, window=window)
+        size, window = self._pictures.size, self._render_mode == "human"
+        return CraneRenderer(self._plant, *size, window=window)
 
     def close(self) -> None:
         """Closes the window and frees the graphics memory."""
@@ -254,14 +271,14 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         return asked
 
     def _read_buttons(self, state: CraneState) -> None:
-        time = self._step_index * self.parameters.control_period
+        time = self._step_index * self._parameters.control_period
         buttons = self._operator.press(time, state)
         if buttons is not self._buttons:
             self._press(buttons)
 
     def _press(self, buttons: Buttons) -> None:
         self._buttons = buttons
-        self._references = buttons.references(self.parameters)
+        self._references = buttons.references(self._parameters)
         self._pressed = np.array(buttons, dtype=np.bool_)
 
     def _show(
@@ -269,7 +286,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     ) -> NDArray[np.float64]:
         """Completes the info, tells recorder and window, and makes the observation."""
         info["buttons"] = self._pressed.copy()
-        if self.render_mode == "human":
+        if self._render_mode == "human":
             self.render()
         if self.recorder is not None:
             truth = Observation(*state, *self._references)

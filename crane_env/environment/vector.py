@@ -14,8 +14,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from crane_env.environment.options import (
-    check_names,
     chosen_by,
+    read_options,
     seeds_of_each,
     starts_of_each,
 )
@@ -36,9 +36,15 @@ from crane_env.plant.batch import VectorPlant
 from crane_env.plant.start import AT_REST, Start
 from crane_env.stage_cost import StageCost
 from crane_env.support.checks import choice, whole
+from crane_env.support.fixed import fixed
 
 if TYPE_CHECKING:
     from crane_env.rendering.scene import VectorRenderer
+
+ANEW = "make a new environment with gymnasium.make_vec"
+
+MAX_CRANES = 1_000_000
+"""Most cranes that step together; each takes some 20 kB."""
 
 CraneSpec = CraneParameters | Mapping[str, Any] | str | None
 """What `CraneParameters.of` reads."""
@@ -125,7 +131,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         render_height: int = 720,
     ) -> None:
         super().__init__()
-        self.num_envs = whole("num_envs", num_envs, 1)
+        self.num_envs = whole("num_envs", num_envs, 1, MAX_CRANES + 1)
         endless = max_episode_steps is None or max_episode_steps == -1
         self.max_episode_steps = (
             None if endless else whole("max_episode_steps", max_episode_steps, 1)
@@ -133,30 +139,30 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         if not isinstance(autoreset_mode, AutoresetMode):
             values = [mode.value for mode in AutoresetMode]
             autoreset_mode = AutoresetMode(choice("autoreset_mode", autoreset_mode, values))
-        self.autoreset_mode = autoreset_mode
+        self._autoreset_mode = autoreset_mode
         modes = self.metadata["render_modes"]
         self._pictures = Pictures(render_mode, modes, render_width, render_height)
-        self.render_mode = render_mode
-        self.cost = StageCost.of(cost)
-        self.randomisation = Randomisation.of(randomisation)
+        self._render_mode = render_mode
+        self._cost = StageCost.of(cost)
+        self._randomisation = Randomisation.of(randomisation)
         self._own_parameters = _cranes(parameters, self.num_envs)
         possible = [
             corner
             for crane in set(self._own_parameters)
-            for corner in self.randomisation.check(crane)
+            for corner in self._randomisation.check(crane)
         ]
-        self.parameters = self._own_parameters[0]
-        self.plant = VectorPlant(self._own_parameters, threads=threads)
+        self._parameters = self._own_parameters[0]
+        self._plant = VectorPlant(self._own_parameters, threads=threads)
         self._default_operators = make_operators(operator, self.num_envs)
         self._operator = VectorOperator(self.num_envs)
 
-        frames = round(1.0 / self.parameters.control_period)
+        frames = round(1.0 / self._parameters.control_period)
         self.metadata = {
             **self.metadata,
             "render_fps": frames,
-            "autoreset_mode": self.autoreset_mode,
+            "autoreset_mode": self._autoreset_mode,
         }
-        limit = self.parameters.acceleration_max
+        limit = self._parameters.acceleration_max
         self.single_action_space = Box(-limit, limit, (1,), dtype=np.float32)
         self.single_observation_space = observation_space(*possible)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -168,15 +174,22 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
         self.recorder: Callable[[StepRecord], None] | None = None
 
+    parameters: CraneParameters = fixed("parameters", ANEW, "The crane, or the first of several.")
+    cost: StageCost = fixed("cost", ANEW, "The stage cost that the rewards are the negative of.")
+    randomisation: Randomisation = fixed("randomisation", ANEW, "Ranges of the cranes.")
+    plant: VectorPlant = fixed("plant", ANEW, "The simulated cranes.")
+    autoreset_mode: AutoresetMode = fixed("autoreset_mode", ANEW, "How ended cranes begin anew.")
+    render_mode: str | None = fixed("render_mode", ANEW, 'None or "rgb_array".')
+
     @property
     def cranes(self) -> tuple[CraneParameters, ...]:
         """Parameters of each crane in its present episode."""
-        return tuple(self.plant.cranes)
+        return tuple(self._plant.cranes)
 
     @property
     def times(self) -> NDArray[np.float64]:
         """Time since the reset of each crane [s], shape (N,)."""
-        return np.multiply(self._step_index, self.parameters.control_period, dtype=np.float64)
+        return np.multiply(self._step_index, self._parameters.control_period, dtype=np.float64)
 
     def reset(
         self,
@@ -200,8 +213,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             TypeError: a mask that is no boolean array.
             ResetNeeded: a mask, before all cranes were reset once.
         """
-        placed = dict(options or {})
-        check_names(placed, "operator", "reset_mask")
+        placed = read_options(options, "operator", "reset_mask")
         chosen = np.ones(self.num_envs, dtype=np.bool_)
         if "reset_mask" in placed:
             chosen = chosen_by(placed.pop("reset_mask"), self.num_envs)
@@ -210,7 +222,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         operators = self._default_operators
         if "operator" in placed:
             operators = make_operators(placed.pop("operator"), self.num_envs)
-        starts = starts_of_each(placed, chosen, self.parameters)
+        starts = starts_of_each(placed, chosen, self._parameters)
         seeds = seeds_of_each(seed, self.num_envs)
         indices = np.flatnonzero(chosen)
         randoms = {
@@ -221,7 +233,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         for index, random in randoms.items():
             self._randoms[index] = random
         self._begin(indices, operators, starts)
-        state, tension = self.plant.measure()
+        state, tension = self._plant.measure()
         info = self._complete(report_start(state, tension))
         self._record(state, info, np.full(self.num_envs, np.nan), np.zeros(self.num_envs))
         infos = lay_out(info, chosen)
@@ -249,21 +261,21 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         """
         if not self._begun.all():
             raise ResetNeeded("Call reset before step.")
-        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
+        if self._autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
             raise ResetNeeded(
                 f"The episode of environment {np.flatnonzero(self._ended)[0]} has ended: call "
                 'reset(options={"reset_mask": ...}) before step.'
             )
         moving = ~self._ended
         asked = self._checked_actions(actions, moving)
-        limit = self.parameters.acceleration_max
+        limit = self._parameters.acceleration_max
         travel_reference, hoist_reference = self._operator.references.copy().T
-        outcome = self.plant.step(np.clip(asked, -limit, limit), hoist_reference, moving)
+        outcome = self._plant.step(np.clip(asked, -limit, limit), hoist_reference, moving)
         self._step_index += moving
         states = np.column_stack(outcome.state)
         self._operator.press(self.times, states, moving & ~outcome.failed)
 
-        reward, info = report_period(outcome, asked, travel_reference, self.parameters, self.cost)
+        reward, info = report_period(outcome, asked, travel_reference, self._parameters, self._cost)
         rewards = np.where(moving, reward, 0.0)
         terminations = np.zeros(self.num_envs, dtype=np.bool_)
         truncations = outcome.failed.copy()
@@ -273,7 +285,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
 
         infos: dict[str, Any] = {}
         beginning = ~moving
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
+        if self._autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
             beginning = self._ended.copy()
             last = np.concatenate((states, self._operator.references), axis=1)
             infos |= lay_out_objects("final_obs", last, beginning)
@@ -283,7 +295,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         if beginning.any():
             indices = np.flatnonzero(beginning)
             self._begin(indices, self._default_operators, [AT_REST] * len(indices))
-            state, tension = self.plant.measure()
+            state, tension = self._plant.measure()
             begun = report_start(state, tension)
             info = {key: np.where(beginning, begun[key], info[key]) for key in begun}
         self._record(state, self._complete(info), asked, rewards)
@@ -309,7 +321,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
     def _make_renderer(self) -> VectorRenderer:
         from crane_env.rendering.scene import VectorRenderer
 
-        return VectorRenderer(self.plant, *self._pictures.size)
+        return VectorRenderer(self._plant, *self._pictures.size)
 
     def close_extras(self) -> None:
         """Frees the graphics memory."""
@@ -343,7 +355,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
     ) -> None:
         """Begins an episode of each of some cranes, where its start says."""
         cranes, streams = [], []
-        randomised = bool(self.randomisation.ranges)
+        randomised = bool(self._randomisation.ranges)
         for index in indices.tolist():
             # One number an episode, as `OILCraneEnv` draws it; all else is drawn from others that
             # it seeds.
@@ -351,11 +363,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             streams.append(np.random.default_rng(number))
             crane = self._own_parameters[index]
             if randomised:
-                crane = self.randomisation.draw(np.random.default_rng((number, 1)), crane)
+                crane = self._randomisation.draw(np.random.default_rng((number, 1)), crane)
             cranes.append(crane)
-        self.plant.exchange(indices, cranes)
-        self.plant.reset(indices, starts)
-        states = self.plant.states()
+        self._plant.exchange(indices, cranes)
+        self._plant.reset(indices, starts)
+        states = self._plant.states()
         for index, crane, stream in zip(indices.tolist(), cranes, streams, strict=True):
             start = CraneState(*states[index].tolist())
             self._operator.reset(index, operators[index], stream, start, crane)

@@ -36,6 +36,8 @@ from crane_env.support.checks import whole
 VARIABLE = ("payload_mass", "cable_stiffness", "cable_length_initial", "drive_bandwidth")
 """Parameters in which cranes that are stepped together may differ."""
 
+MAX_THREADS = 1024
+
 SHARED = tuple(
     field.name for field in dataclasses.fields(CraneParameters) if field.name not in VARIABLE
 )
@@ -56,7 +58,7 @@ class VectorPlant:
     def __init__(self, cranes: Sequence[CraneParameters], *, threads: int = 0) -> None:
         if not cranes:
             raise ValueError("A vector plant needs at least one crane.")
-        self.threads = whole("threads", threads)
+        self.threads = whole("threads", threads, 0, MAX_THREADS + 1)
         self.cranes = [cranes[0]] * len(cranes)
         model = build_model(cranes[0])
         self._payload = model.body("payload").id

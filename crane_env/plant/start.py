@@ -30,7 +30,7 @@ class Start(NamedTuple):
         sway_angle: clear of the girder [rad].
         sway_rate: [rad/s].
         trolley_position: within the limit switches [m].
-        trolley_velocity: within the speed limit [m/s].
+        trolley_velocity: within the speed limit and what stops before the limit switches [m/s].
     """
 
     cable_length: float | None = None
@@ -47,7 +47,12 @@ class Start(NamedTuple):
         """
         rail, speed = parameters.trolley_position_limit, parameters.trolley_speed_max
         position = within("trolley_position", self.trolley_position, -rail, rail, "m")
-        velocity = within("trolley_velocity", self.trolley_velocity, -speed, speed, "m/s")
+        backward, forward = (
+            min(speed, math.sqrt(2.0 * parameters.acceleration_max * gap))
+            for gap in (rail + position, rail - position)
+        )
+        unit = f"m/s at {position:g} m"
+        velocity = within("trolley_velocity", self.trolley_velocity, -backward, forward, unit)
         length = parameters.cable_length_initial
         if self.cable_length is not None:
             shortest, longest = parameters.cable_length_min, parameters.cable_length_max

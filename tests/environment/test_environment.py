@@ -270,6 +270,65 @@ def test_wrong_reset_options_are_refused_and_the_state_stays(
     assert digest([env.step(np.zeros(1))]) == digest([twin.step(np.zeros(1))])
 
 
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"seed": 99, "options": {"cable_length": 99.0}}, "cable_length must be from 1 to 12 m"),
+        ({"seed": 99, "options": {"cable_length": True}}, "cable_length must be a finite number"),
+        ({"seed": 99, "options": {"cable_length": "5"}}, "cable_length must be a finite number"),
+        ({"seed": 99, "options": {"operator": "nobody"}}, "nobody"),
+        ({"seed": 99, "options": [1]}, "Reset options must be a mapping"),
+        ({"seed": 99, "options": {1: 2.0}}, "Unknown reset option 1"),
+        ({"seed": 2**63}, "A seed must be a whole number of at least 0 and below"),
+        (
+            {"seed": 99, "options": {"trolley_position": 19.7, "trolley_velocity": 1.0}},
+            "trolley_velocity must be from .* at 19.7 m",
+        ),
+    ],
+)
+def test_a_refused_reset_leaves_no_trace_in_the_next_episode(
+    arguments: dict[str, Any], sentence: str
+) -> None:
+    env, untouched = make(), make()
+    for each in (env, untouched):
+        each.reset(seed=1)
+    with pytest.raises(ValueError, match=sentence):
+        env.reset(**arguments)
+    assert digest([env.reset()]) == digest([untouched.reset()])
+
+
+@pytest.mark.parametrize("name", ["parameters", "cost", "plant", "render_mode"])
+def test_what_an_environment_was_made_from_cannot_be_set(name: str) -> None:
+    env = make()
+    with pytest.raises(AttributeError, match=f"{name} of OILCraneEnv .* make a new environment"):
+        setattr(env.unwrapped, name, None)
+    vector = gymnasium.make_vec("OILCrane-v0", 2)
+    with pytest.raises(AttributeError, match=f"{name} of OILCraneVectorEnv .* make a new env"):
+        setattr(vector.unwrapped, name, None)
+
+
+class EverySecond:
+    """An operator that counts how often it is asked."""
+
+    def reset(self, rng: Any, start: Any, parameters: CraneParameters) -> None:
+        self.steps = 0
+
+    def press(self, time: float, state: Any) -> Buttons:
+        self.steps += 1
+        return Buttons(forward=self.steps // 50 % 2 == 1)
+
+
+def test_an_operator_given_to_several_environments_is_shared_by_none() -> None:
+    operator = EverySecond()
+    envs = [make(operator=operator), make(operator=operator), make()]
+    for env in envs:
+        env.reset(seed=0, options=None if env is not envs[2] else {"operator": operator})
+    rows = [[env.step(np.zeros(1))[0][6] for env in envs] for _ in range(200)]
+    assert np.flatnonzero(np.diff([row[0] for row in rows])).tolist() == [47, 97, 147, 197]
+    assert all(len(set(row)) == 1 for row in rows)
+    assert not hasattr(operator, "steps")
+
+
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])
 @pytest.mark.parametrize("operator", ["random", "manoeuvre", "table1:2"])
 def test_a_copy_in_mid_episode_continues_bit_for_bit(duplicate: Any, operator: str) -> None:
