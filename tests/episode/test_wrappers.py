@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from crane_env import Observation, Trajectory, run_episode, run_episodes
 
 Wrap = Callable[[Any], Any]
-STEPS = 60
+STEPS = 30
+BARE = gymnasium.make("OILCrane-v0", operator="random").unwrapped
 
 
 def spoil(observation: Any) -> Any:
@@ -118,21 +119,20 @@ def wrapped(env: Any, names: list[str], kinds: dict[str, Wrap]) -> Any:
 
 def assert_is_the_motion_of(record: Trajectory, seed: int) -> None:
     """The same actions on the bare environment lead to the same record."""
-    bare = gymnasium.make("OILCrane-v0", operator="random").unwrapped
-    observation, info = bare.reset(seed=seed)
+    observation, info = BARE.reset(seed=seed)
     for k in range(len(record)):
         seen = Observation(*observation.tolist())
         assert record.time[k] == k * 0.02
         assert [record.columns()[name][k] for name in seen._fields] == list(seen)
         assert record.payload_velocity[k] == pytest.approx(info["payload_velocity"], rel=1e-12)
-        observation, reward, _, _, info = bare.step(record.action[k : k + 1])
+        observation, reward, _, _, info = BARE.step(record.action[k : k + 1])
         assert record.reward[k] == pytest.approx(reward, rel=1e-12)
         assert record.acceleration[k] == info["acceleration"]
 
 
 @pytest.mark.filterwarnings("ignore:.*WARN")  # of the checker, about other wrappers
 @given(st.lists(st.sampled_from(sorted(SINGLE)), max_size=4), st.integers(0, 99))
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=30)
 def test_behind_any_stack_of_wrappers_the_record_is_the_plants_own_motion(
     names: list[str], seed: int
 ) -> None:
@@ -149,7 +149,7 @@ def test_behind_any_stack_of_wrappers_the_record_is_the_plants_own_motion(
 
 
 @given(st.lists(st.sampled_from(sorted(VECTOR)), max_size=4), st.integers(0, 99))
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=12)
 def test_the_same_holds_for_many_cranes(names: list[str], seed: int) -> None:
     bare = gymnasium.make_vec("OILCrane-v0", 2, operator="random", max_episode_steps=STEPS)
     env = wrapped(bare, names, VECTOR)

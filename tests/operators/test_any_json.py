@@ -24,6 +24,7 @@ from crane_env.operators.table1 import Table1Manoeuvre
 from crane_env.parameters import CraneParameters
 
 PAPER = CraneParameters.paper()
+CRANE = gymnasium.make("OILCrane-v0").unwrapped
 START = CraneState(0.0, 0.0, 8.0, 0.0, 0.0, 0.0)
 NAMES = ("random", "manoeuvre", "table1:3", "script", "script:a.csv", "script:a.json")
 DESCRIBED = [f.name for kind in (ButtonHabits, RandomManoeuvre) for f in dataclasses.fields(kind)]
@@ -74,9 +75,8 @@ def test_any_json_value_is_an_operator_that_presses_or_a_value_error(value: Any)
 @given(values | mappings | scripts)
 @settings(deadline=None, max_examples=30)
 def test_so_it_is_among_the_options_of_a_reset(value: Any) -> None:
-    env = gymnasium.make("OILCrane-v0").unwrapped
     with contextlib.suppress(ValueError, FileNotFoundError, ImportError):
-        env.reset(options={"operator": value})
+        CRANE.reset(options={"operator": value})
 
 
 @pytest.mark.parametrize("kind", [Table1Manoeuvre, ButtonScript])
