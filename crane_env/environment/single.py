@@ -112,8 +112,8 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
 
     A process that did not import `crane_env` knows the environment as "crane_env:OILCrane-v0"
     (Gymnasium's AsyncVectorEnv, Stable-Baselines3's SubprocVecEnv started by "spawn"). On a screen,
-    use `render_mode="human"`; Gymnasium's `HumanRendering` opens a window of its own beside the
-    OpenGL that draws the picture, which needs MUJOCO_GL=osmesa or glfw under X11.
+    use `render_mode="human"`; Gymnasium's `HumanRendering` takes the OpenGL of the thread for its
+    own window, which under X11 needs MUJOCO_GL=glfw.
 
     Args:
         operator: who presses the buttons: "random", "manoeuvre", "table1:3", "script:FILE", a

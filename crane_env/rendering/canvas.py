@@ -74,12 +74,12 @@ class PixelCanvas:
         """See `Canvas.paint`.
 
         Raises:
-            RuntimeError: the canvas is closed.
+            RuntimeError: the canvas is closed, or another window has taken the thread's OpenGL.
         """
         if not self._release.alive:
             raise RuntimeError("This canvas is closed; nothing can be painted on it any more.")
         pixels = np.empty((self._area.height, self._area.width, 3), dtype=np.uint8)
-        with self._gl.as_current():
+        with current(self._gl):
             painter(self._area, self._context)
             mujoco.mjr_readPixels(pixels, None, self._area, self._context)
         # OpenGL counts rows from the bottom.
@@ -245,7 +245,25 @@ def release_at_end(
     return release
 
 
+@contextlib.contextmanager
+def current(gl: GLContext) -> Iterator[None]:
+    """Lets the calling thread draw in a context.
+
+    Raises:
+        RuntimeError: the thread draws for a window of another library.
+    """
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(gl.as_current())
+        except Exception as error:  # of a kind of its own with each back end
+            raise RuntimeError(
+                "Another window has taken this thread's OpenGL, as Gymnasium's HumanRendering does "
+                'under X11: use render_mode="human" instead of it, or set MUJOCO_GL=glfw.'
+            ) from error
+        yield
+
+
 def _release(gl: GLContext, context: mujoco.MjrContext) -> None:
-    with gl.as_current():
+    with contextlib.suppress(RuntimeError), current(gl):
         context.free()
     gl.free()

@@ -267,6 +267,17 @@ def test_a_closed_renderer_says_so_and_closes_again_quietly() -> None:
         drawn.draw()
 
 
+def test_a_window_that_takes_the_threads_opengl_is_named(
+    crane: Drawn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def taken() -> None:
+        raise OSError("EGL_BAD_ACCESS")
+
+    monkeypatch.setattr(crane.renderer._canvas._gl, "as_current", taken)  # type: ignore[attr-defined]
+    with pytest.raises(RuntimeError, match="HumanRendering does under X11: use render_mode"):
+        crane.draw()
+
+
 @given(st.lists(st.floats(0.0, 0.5), min_size=1, max_size=3000))
 def test_the_chart_keeps_its_span_and_never_more_than_a_figure_can_hold(gaps: list[float]) -> None:
     chart, now = Chart(1.0), 0.0
