@@ -274,7 +274,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         time = self._step_index * self._parameters.control_period
         buttons = self._operator.press(time, state)
         if buttons is not self._buttons:
-            self._press(buttons)
+            self._press(Buttons.of(buttons))
 
     def _press(self, buttons: Buttons) -> None:
         self._buttons = buttons

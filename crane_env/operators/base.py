@@ -16,7 +16,7 @@ import numpy as np
 
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
-from crane_env.support.checks import within
+from crane_env.support.checks import shown, within
 
 EVENT_TOLERANCE = 1e-9
 """Events this close after a control step count at it: rounding of step times [s]."""
@@ -35,6 +35,23 @@ class Buttons(NamedTuple):
     backward: bool = False
     up: bool = False
     down: bool = False
+
+    @classmethod
+    def of(cls, pressed: object) -> Buttons:
+        """Reads buttons from themselves or from four booleans.
+
+        Raises:
+            ValueError: something else.
+        """
+        if isinstance(pressed, cls) and all(type(value) is bool for value in pressed):
+            return pressed
+        values = tuple(pressed) if isinstance(pressed, Iterable) else ()
+        booleans = all(isinstance(v, (bool, int, np.bool_)) and v in (0, 1) for v in values)
+        if booleans and len(values) == len(cls._fields):
+            return cls(*map(bool, values))
+        raise ValueError(
+            f"Pressed buttons are four booleans ({', '.join(cls._fields)}), not {shown(pressed)}."
+        )
 
     @property
     def travel(self) -> int:

@@ -99,7 +99,7 @@ class VectorOperator:
             self._ask(index, operator, float(times[index]), CraneState(*states[index].tolist()))
 
     def _ask(self, index: int, operator: Operator, time: float, state: CraneState) -> None:
-        buttons = operator.press(time, state)
+        buttons = Buttons.of(operator.press(time, state))
         self.buttons[index] = buttons
         parameters = self._parameters[index]
         assert parameters is not None, "an operator operates a crane"

@@ -187,18 +187,12 @@ def _python_entries(schedule: object) -> Iterator[_Entry]:
         where = f"Button script, entry {number}"
         try:
             time, pressed = entry
-            forward, backward, up, down = pressed
+            yield _Entry(where, time, Buttons.of(pressed))
         except (TypeError, ValueError):
             raise ValueError(
                 f"{where}: must be a ButtonEvent or a pair of a time and four booleans "
                 f"({', '.join(Buttons._fields)}), not {shown(entry)}."
             ) from None
-        values = (forward, backward, up, down)
-        if not all(
-            isinstance(value, bool | int | np.bool_) and value in (0, 1) for value in values
-        ):
-            raise ValueError(f"{where}: buttons must be booleans, not {shown(pressed)}.")
-        yield _Entry(where, time, Buttons(*map(bool, values)))
 
 
 def _csv_entries(text: str, name: str) -> Iterator[_Entry]:

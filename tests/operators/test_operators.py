@@ -172,6 +172,18 @@ def test_an_environments_own_operator_shares_nothing() -> None:
         own_operator(Uncopyable())
 
 
+@pytest.mark.parametrize("pressed", [None, True, "up__", (0, 0, 0), (0, 0, 0, 2)])
+@pytest.mark.parametrize("mode", ["sync", "vector_entry_point"])
+def test_an_operator_that_presses_no_buttons_is_told_so(mode: str, pressed: Any) -> None:
+    class Confused(EverySecond):
+        def press(self, time: float, state: CraneState) -> Any:
+            return pressed
+
+    env = gymnasium.make_vec("OILCrane-v0", 1, vectorization_mode=mode, operator=Confused())
+    with pytest.raises(ValueError, match="Pressed buttons are four booleans"):
+        env.reset()
+
+
 @pytest.mark.parametrize("options", [None, {"operator": EverySecond()}])
 def test_environments_that_are_given_one_operator_do_not_share_it(options: Any) -> None:
     cranes = {} if options else {"operator": EverySecond()}
