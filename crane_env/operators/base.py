@@ -16,7 +16,7 @@ import numpy as np
 
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
-from crane_env.support.checks import shown, within
+from crane_env.support.checks import shown
 
 EVENT_TOLERANCE = 1e-9
 """Events this close after a control step count at it: rounding of step times [s]."""
@@ -102,24 +102,6 @@ def press_events(presses: Iterable[Press]) -> list[ButtonEvent]:
         ButtonEvent(time, Buttons(**{p.button: True for p in held if p.start <= time < p.end}))
         for time in times
     ]
-
-
-def probability(name: str, value: object) -> float:
-    """A number from 0 to 1.
-
-    Raises:
-        ValueError: it is something else.
-    """
-    return within(name, value, 0.0, 1.0)
-
-
-def time_of_episode(name: str, value: object) -> float:
-    """A time [s] from 0 to `LONGEST_TIME`.
-
-    Raises:
-        ValueError: it is something else.
-    """
-    return within(name, value, 0.0, LONGEST_TIME, "s")
 
 
 class Operator(Protocol):

@@ -29,11 +29,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crane_env.observation import CraneState
-from crane_env.operators.base import ButtonEvent, Press, press_events, probability, time_of_episode
+from crane_env.operators.base import LONGEST_TIME, ButtonEvent, Press, press_events
 from crane_env.operators.dead_reckoning import hoist_axis, trolley_axis
 from crane_env.operators.table1 import HOIST_PRESS_DURATION, ManoeuvreTimes
 from crane_env.parameters import CraneParameters
-from crane_env.support.checks import not_negative
+from crane_env.support.checks import not_negative, within
 from crane_env.support.fields import check_fields
 
 ORDER = (
@@ -87,9 +87,9 @@ class RandomManoeuvre:
 
     def __post_init__(self) -> None:
         """Refuses times that make no manoeuvre."""
-        check_fields(self, time_of_episode, TIMES)
+        check_fields(self, within, TIMES, 0.0, LONGEST_TIME, "s")
         check_fields(self, not_negative, ("trolley_margin", "hoist_margin"))
-        check_fields(self, probability, ("backward_probability",))
+        check_fields(self, within, ("backward_probability",), 0.0, 1.0)
         for least, greatest in ORDER:
             low, high = getattr(self, least), getattr(self, greatest)
             if low > high:

@@ -28,6 +28,7 @@ A JSON file is a list of entries, each with its time and a list of the buttons p
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
@@ -56,6 +57,9 @@ MOST_EVENTS = 100_000
 
 HEADER = f"it names time and any of {', '.join(Buttons._fields)}, each once"
 """What the first line of a CSV file does."""
+
+COLUMNS = {"time", *Buttons._fields}
+"""That a CSV file may have."""
 
 HELD = {"1": True, "true": True, "0": False, "false": False}
 """How a CSV file says whether a button is pressed."""
@@ -199,36 +203,41 @@ def _csv_entries(text: str, name: str) -> Iterator[_Entry]:
     delimiter = _delimiter(text)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     columns: list[str] = []
-    while True:
-        try:
-            row = next(reader, None)
-        except csv.Error as error:
-            raise ValueError(f"{name}, line {reader.line_num}: {error}.") from error
-        if row is None:
-            break
-        where = f"{name}, line {reader.line_num}"
-        cells = [cell.strip() for cell in row]
-        if not any(cells) or cells[0].startswith("#"):
-            continue
-        if not columns:
-            columns = _csv_columns(cells, where)
-            continue
-        if len(cells) != len(columns):
-            raise ValueError(
-                f"{where}: {len(columns)} values expected ({delimiter.join(columns)}), got "
-                f"{len(cells)}; with decimal commas, separate columns by semicolons."
-            )
-        values = dict(zip(columns, cells, strict=True))
-        time = values.pop("time")
-        for button, value in values.items():
-            if value.lower() not in HELD:
-                raise ValueError(
-                    f"{where}: {button} must be 0 or 1, false or true, not {shown(value)}."
-                )
-        buttons = RELEASED._replace(**{name: HELD[value.lower()] for name, value in values.items()})
-        yield _Entry(where, _number(time, "." if delimiter == "," else ","), buttons)
+    try:
+        for row in reader:
+            where = f"{name}, line {reader.line_num}"
+            cells = [cell.strip() for cell in row]
+            if not any(cells) or cells[0].startswith("#"):
+                continue
+            if columns:
+                yield _csv_entry(columns, cells, delimiter, where)
+            elif "time" in cells and len({*cells}) == len({*cells} & COLUMNS) == len(cells):
+                columns = cells
+            else:
+                raise ValueError(f"{where}: not a header, {shown(','.join(cells))}; {HEADER}.")
+    except csv.Error as error:
+        raise ValueError(f"{name}, line {reader.line_num}: {error}.") from error
     if not columns:
         raise ValueError(f"{name}, line 1: a header is missing; {HEADER}.")
+
+
+def _csv_entry(columns: list[str], cells: list[str], delimiter: str, where: str) -> _Entry:
+    if len(cells) != len(columns):
+        raise ValueError(
+            f"{where}: {len(columns)} values expected ({delimiter.join(columns)}), got "
+            f"{len(cells)}; with decimal commas, separate columns by semicolons."
+        )
+    values = dict(zip(columns, cells, strict=True))
+    time: object = values.pop("time")
+    for button, value in values.items():
+        if value.lower() not in HELD:
+            raise ValueError(
+                f"{where}: {button} must be 0 or 1, false or true, not {shown(value)}."
+            )
+    buttons = RELEASED._replace(**{name: HELD[value.lower()] for name, value in values.items()})
+    with contextlib.suppress(ValueError):  # the text itself is what the error on it shows
+        time = float(str(time).replace("." if delimiter == "," else ",", "."))
+    return _Entry(where, time, buttons)
 
 
 def _delimiter(text: str) -> str:
@@ -236,20 +245,6 @@ def _delimiter(text: str) -> str:
     lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
     header = next(lines, "")
     return next((mark for mark in ",;\t" if mark in header), ",")
-
-
-def _csv_columns(cells: list[str], where: str) -> list[str]:
-    unknown = sorted(set(cells) - {"time", *Buttons._fields})
-    if "time" not in cells or unknown or len(set(cells)) < len(cells):
-        raise ValueError(f"{where}: not a header, {shown(','.join(cells))}; {HEADER}.")
-    return cells
-
-
-def _number(text: str, decimal_mark: str) -> float | str:
-    try:
-        return float(text.replace(decimal_mark, "."))
-    except ValueError:
-        return text
 
 
 def _csv_text(schedule: tuple[ButtonEvent, ...]) -> str:

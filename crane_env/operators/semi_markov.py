@@ -45,7 +45,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crane_env.observation import CraneState
-from crane_env.operators.base import ButtonEvent, Buttons, probability, time_of_episode
+from crane_env.operators.base import LONGEST_TIME, ButtonEvent, Buttons
 from crane_env.operators.dead_reckoning import Axis, hoist_axis, trolley_axis
 from crane_env.parameters import CraneParameters
 from crane_env.support.checks import not_negative, positive, shown, within
@@ -118,10 +118,10 @@ class ButtonHabits:
 
     def __post_init__(self) -> None:
         """Refuses habits that no thumb can have."""
-        check_fields(self, probability, PROBABILITIES)
-        check_fields(self, time_of_episode, TIMES)
+        check_fields(self, within, PROBABILITIES, 0.0, 1.0)
+        check_fields(self, within, TIMES, 0.0, LONGEST_TIME, "s")
         check_fields(self, positive, POSITIVE)
-        check_fields(self, lambda name, value: within(name, value, 0.0, MAX_SPREAD), SPREADS)
+        check_fields(self, within, SPREADS, 0.0, MAX_SPREAD)
         check_fields(self, not_negative, ("limit_margin",))
         for least, greatest in (("pulse_min", "pulse_max"), ("slip_min", "slip_max")):
             low, high = getattr(self, least), getattr(self, greatest)
@@ -186,8 +186,6 @@ class RandomButtons:
 class _TwoThumbs:
     """Events of both thumbs, merged in order of time."""
 
-    __slots__ = ("_hoist", "_period", "_travel")
-
     def __init__(self, travel: _Thumb, hoist: _Thumb, period: float) -> None:
         self._travel = travel
         self._hoist = hoist
@@ -216,22 +214,6 @@ class _Thumb:
         plus: whether the button of direction +1 (forward, down) is pressed.
         minus: whether the button of direction -1 (backward, up) is pressed.
     """
-
-    __slots__ = (
-        "_acting",
-        "_axis",
-        "_begin",
-        "_direction",
-        "_habits",
-        "_period",
-        "_position",
-        "_pulse",
-        "_rate",
-        "_rng",
-        "end",
-        "minus",
-        "plus",
-    )
 
     def __init__(
         self,

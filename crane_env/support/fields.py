@@ -53,19 +53,22 @@ def with_fields(given: T, changes: Any, *, must_be: str, unknown: str) -> T:
     return replaced
 
 
-def check_fields(given: Any, check: Callable[[str, object], object], names: Iterable[str]) -> None:
+def check_fields(
+    given: Any, check: Callable[..., object], names: Iterable[str], *limits: object
+) -> None:
     """Puts what a check makes of some fields in their place; for `__post_init__`.
 
     Args:
         given: a dataclass that is being built.
-        check: of a field's name and value, such as those of `crane_env.support.checks`.
+        check: of a field's name and value, one of `crane_env.support.checks`.
         names: of the fields.
+        limits: further arguments of the check.
 
     Raises:
         ValueError: the check refuses one.
     """
     for name in names:
-        object.__setattr__(given, name, check(name, getattr(given, name)))
+        object.__setattr__(given, name, check(name, getattr(given, name), *limits))
 
 
 def _fields(cls: Any, value: Any, must_be: str, unknown: str) -> Mapping[str, Any]:

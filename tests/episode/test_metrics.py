@@ -100,10 +100,3 @@ def test_times_of_act_are_summarised() -> None:
     assert (m.act_median, m.act_max) == (1e-3, 30e-3)
     assert m.act_p99 == pytest.approx(30e-3)
     assert m.act_late == 0.02
-
-
-def test_the_printed_metrics_name_every_index() -> None:
-    m = trajectory().metrics()
-    printed = str(m)
-    for name in m.as_dict():
-        assert name in printed
