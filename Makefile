@@ -6,7 +6,7 @@ RUN := $(VENV)/bin/python
 PIP := $(RUN) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help evaluate reproduce test check benchmark clean
+.PHONY: help evaluate reproduce test check benchmark docs clean
 
 help:  ## Lists the commands.
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -28,8 +28,11 @@ check: $(VENV)/dev.stamp  ## Runs the linters alone.
 benchmark: $(VENV)/run.stamp  ## Measures speed, as ratios taken in one run.
 	$(RUN) scripts/benchmark.py $(ARGS)
 
+docs: $(VENV)/dev.stamp  ## Builds the documentation with its examples, in docs/build.
+	$(RUN) -m sphinx --fail-on-warning --keep-going --quiet docs docs/build
+
 clean:  ## Removes the virtual environment and caches, not the results.
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis build *.egg-info
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis build *.egg-info docs/api docs/build docs/gallery
 
 # A stamp appears only after its installation succeeded, so an interrupted one is repeated.
 $(VENV)/bin/python:

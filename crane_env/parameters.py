@@ -75,7 +75,7 @@ MAX_SUBSTEPS = 10_000
 class CraneParameters:
     """What the crane is made of; the defaults are the paper's (section V).
 
-    Values that the paper does not give are marked "assumed"; README.md lists the reasons.
+    Values that the paper does not give are marked "assumed"; docs/crane.md lists the reasons.
 
     Attributes:
         trolley_mass: m_c [kg].

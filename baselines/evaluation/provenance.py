@@ -17,7 +17,7 @@ import crane_env
 
 DISTRIBUTION = "oilcrane"
 
-PRESENTATION_EXTRAS = frozenset({"results", "dev"})
+PRESENTATION_EXTRAS = frozenset({"results", "film", "docs", "dev"})
 """Extras whose packages store, draw or check results but do not make them."""
 
 
