@@ -10,6 +10,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from crane_env.parameters import CraneParameters
+from crane_env.support.checks import shown
 
 BUFFER_TIME = 0.1
 """Time in which the buffers at the rails' ends stop a trolley, at most [s]."""
@@ -54,12 +55,15 @@ class Observation(NamedTuple):
         """Names the entries of an observation array, shape (8,).
 
         Raises:
-            ValueError: the array does not have eight entries.
+            ValueError: it is no array of eight numbers.
         """
-        values = array.tolist()
-        if len(values) != len(cls._fields):
-            raise ValueError(f"An observation has {len(cls._fields)} entries, not {len(values)}.")
-        return cls._make(values)
+        shape = getattr(array, "shape", None)
+        if shape != (len(cls._fields),):
+            given = shown(array) if shape is None else f"one of shape {tuple(shape)}"
+            raise ValueError(
+                f"An observation is an array of {len(cls._fields)} numbers, not {given}."
+            )
+        return cls._make(array.tolist())
 
 
 def largest_state(parameters: CraneParameters) -> CraneState:

@@ -442,9 +442,12 @@ def test_an_operator_that_looks_is_asked_at_every_step_as_by_the_single_environm
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_diverged_crane_is_truncated_alone(
-    mode: AutoresetMode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    mode: AutoresetMode,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.chdir(tmp_path)  # MuJoCo logs the divergence there
+    monkeypatch.chdir(tmp_path)
     vector, untouched = (make(autoreset_mode=mode) for _ in range(2))
     actions = np.zeros((COUNT, 1))
     for env in (vector, untouched):
@@ -472,6 +475,8 @@ def test_a_diverged_crane_is_truncated_alone(
     assert not infos["simulation_failed"].any()
     assert observations[others].tobytes() == untouched.step(actions)[0][others].tobytes()
     assert observations[2, 2] == pytest.approx(8.0, abs=1e-6), "a new episode has begun"
+    assert list(tmp_path.iterdir()) == [], "MuJoCo logs nothing"
+    assert capfd.readouterr() == ("", "")
 
 
 def test_gymnasiums_vector_wrappers_work_on_it() -> None:
