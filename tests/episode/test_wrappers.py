@@ -139,13 +139,16 @@ def test_behind_any_stack_of_wrappers_the_record_is_the_plants_own_motion(
     bare = gymnasium.make("OILCrane-v0", operator="random", max_episode_steps=STEPS)
     env = wrapped(bare, names, SINGLE)
     controller = Sampler(env.action_space)
+    heard: list[Any] = []
+    env.unwrapped.recorder = listener = heard.append
     record = run_episode(env, controller, seed=seed)
     assert_is_the_motion_of(record, seed)
     assert 1 <= len(record) <= STEPS + 1
     assert np.isfinite(record.act_time).sum() == controller.calls
     assert np.isfinite(record.metrics().act_max)
     assert record.metrics().stage_cost == -record.reward.sum()
-    assert env.unwrapped.recorder is None
+    assert env.unwrapped.recorder is listener
+    assert len(heard) > len(record)
 
 
 @given(st.lists(st.sampled_from(sorted(VECTOR)), max_size=4), st.integers(0, 99))
