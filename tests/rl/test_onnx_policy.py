@@ -141,7 +141,8 @@ def test_a_card_of_another_file_or_format_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_shipped_policy_drives_as_its_card_says(name: str) -> None:
     card = read_card(SHIPPED / f"{name}.onnx")
-    env = gymnasium.make("OILCrane-v0", operator="table1:4")
+    crane = card["settings"]["parameters"]
+    env = gymnasium.make("OILCrane-v0", operator="table1:4", parameters=crane)
     metrics = run_episode(env, make_controller(name), seed=0).metrics()
     assert pytest.approx(card["table1"]["IAE"][3], rel=1e-6) == metrics.IAE
     assert metrics.release_drift == pytest.approx(card["table1"]["release_drift"][3], rel=1e-6)
