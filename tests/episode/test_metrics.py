@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
+import functools
 import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from crane_env.episode.metrics import after_release, integral_absolute_error, release_step
-from crane_env.episode.trajectory import Trajectory
-from crane_env.parameters import CraneParameters
+from tests.episode.made_up import made_up_trajectory
 
 PERIOD = 0.02
 COUNT = 1000
 TIME = PERIOD * np.arange(COUNT)
 
 
-def trajectory(**given: NDArray[np.generic]) -> Trajectory:
-    """A trajectory of zeros, the cable taut, but for the given columns."""
-    zeros, no = np.zeros(COUNT), np.zeros(COUNT, dtype=bool)
-    columns = {
-        field.name: zeros
-        for field in dataclasses.fields(Trajectory)
-        if field.name not in ("parameters", "solver_failures", "simulation_failed")
-    }
-    columns |= {"action_clipped": no, "drive_limited": no, "cable_tension": zeros + 981.0}
-    columns |= {"cable_length": zeros + 8.0}
-    return Trajectory(**{**columns, **given}, parameters=CraneParameters())
+trajectory = functools.partial(made_up_trajectory, COUNT)
 
 
 def test_the_release_is_the_last_time_the_travel_reference_turns_to_zero() -> None:

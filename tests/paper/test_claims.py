@@ -15,7 +15,8 @@ from baselines.mpc.settings import MpcSettings
 from baselines.paper.claims import CLAIMS, NOT_CHECKABLE, Claim
 from baselines.paper.evidence import Evidence
 from baselines.paper.oscillation import short_cable_oscillation, turning_points
-from crane_env import CraneParameters, Trajectory
+from crane_env import Trajectory
+from tests.episode.made_up import made_up_trajectory
 from tests.paper.paper_evidence import COUNT, agreeing_evidence, scaled
 
 AGREEING = agreeing_evidence()
@@ -157,18 +158,14 @@ def test_a_sine_turns_once_in_each_half_period_whatever_its_offset_and_noise(
     assert turning_points(-signal, 0.85 * amplitude) == [-turn for turn in turns]
 
 
-def made_up_trajectory(error: np.ndarray, short: np.ndarray, travelling: np.ndarray) -> Trajectory:
-    zeros = np.zeros(error.size)
-    arrays = {field.name: zeros for field in dataclasses.fields(Trajectory)}
+def swinging(error: np.ndarray, short: np.ndarray, travelling: np.ndarray) -> Trajectory:
     reference = np.where(travelling, -1.0, 0.0)
-    arrays |= {
-        "cable_length": np.where(short, 4.0, 8.0),
-        "travel_reference": reference,
-        "payload_velocity": reference + error,
-        "parameters": CraneParameters(),
-        "solver_failures": 0,
-    }
-    return Trajectory(**arrays)
+    return made_up_trajectory(
+        error.size,
+        cable_length=np.where(short, 4.0, 8.0),
+        travel_reference=reference,
+        payload_velocity=reference + error,
+    )
 
 
 @pytest.mark.parametrize(
@@ -190,12 +187,12 @@ def test_a_swing_goes_from_one_side_of_the_reference_to_the_other(
     short, travelling = time >= 4.0, time < 10.0
     # What happens on the long cable or without a travel button must not matter.
     wild = np.where(short & travelling, error(time), 7.0 * np.sin(9.0 * time))
-    found = short_cable_oscillation(made_up_trajectory(wild, short, travelling))
+    found = short_cable_oscillation(swinging(wild, short, travelling))
     assert found.swing == pytest.approx(swing, abs=1e-3)
     assert found.error == pytest.approx(np.sqrt(np.mean(error(time[short & travelling]) ** 2)))
 
 
 def test_without_travel_on_the_short_cable_there_is_nothing_to_measure() -> None:
     time = np.arange(0.0, 2.0, 0.02)
-    found = short_cable_oscillation(made_up_trajectory(0.0 * time, time >= 1.0, time < 1.0))
+    found = short_cable_oscillation(swinging(0.0 * time, time >= 1.0, time < 1.0))
     assert np.isnan(found).all()
