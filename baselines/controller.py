@@ -7,20 +7,35 @@ A controller is built from nominal `CraneParameters` and sees observations only;
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crane_env.observation import Observation
 
+SHAPE = (len(Observation._fields),)
+"""Of an observation."""
 
-def finite_observation(array: NDArray[np.float64]) -> Observation:
+
+def finite_observation(array: Any) -> Observation:
     """Names the entries of an observation and refuses poisoned ones.
 
+    Args:
+        array: of real numbers of any type, or a list of them; shape (8,).
+
     Raises:
-        ValueError: the wrong number of entries, or one that is not finite.
+        ValueError: something else, or an entry that is not finite.
     """
-    observation = Observation.of(array)
+    try:
+        measured = np.asarray(array)
+    except (ValueError, TypeError, OverflowError):  # rows of unequal length
+        measured = np.empty(0, dtype=object)
+    if measured.shape != SHAPE or measured.dtype.kind not in "fiu":
+        raise ValueError(
+            f"act() needs an observation of {SHAPE[0]} numbers, not "
+            f"{measured.dtype} of shape {measured.shape}."
+        )
+    observation = Observation._make(measured.astype(np.float64, copy=False).tolist())
     if not all(map(math.isfinite, observation)):
         values = zip(observation._fields, observation, strict=True)
         name, value = next((name, x) for name, x in values if not math.isfinite(x))

@@ -15,7 +15,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from baselines.mpc.settings import MpcSettings
-from crane_env.controller import Controller
+from crane_env.controller import Controller, check_controller
 from crane_env.parameters import CraneParameters
 from crane_env.support.checks import shown
 from crane_env.support.factory import FactoryError, found_at, is_place, placed_errors
@@ -73,12 +73,10 @@ def make_controller(
         arguments = (crane, takes.of(settings))
     with _placed_errors(name):
         controller = build(*arguments)
-    methods = (getattr(controller, method, None) for method in ("reset", "act"))
-    if isinstance(controller, type) or not all(map(callable, methods)):
-        raise FactoryError(
-            f"The factory of {name!r} must return a controller, an object with reset() and "
-            f"act(observation), not {shown(controller)}."
-        )
+    try:
+        check_controller(controller)
+    except ValueError as error:
+        raise FactoryError(f"The factory of {name!r} makes no controller. {error}") from None
     return controller  # type: ignore[no-any-return]
 
 

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines import make_controller
 from baselines.manual import Manual
 from crane_env.parameters import CraneParameters
 from tests.mpc.prediction.linear_crane import observe
@@ -93,9 +92,3 @@ def test_a_trolley_that_a_limit_switch_holds_stays_when_the_button_is_released()
 
 def test_a_free_trolley_gets_a_ramp_too() -> None:
     assert act(Manual(CraneParameters(drive_bandwidth=0.0)), 0.0, 1.0) == 5.0
-
-
-def test_a_poisoned_observation_is_refused_by_name() -> None:
-    controller = make_controller("manual")
-    with pytest.raises(ValueError, match="travel_reference is nan"):
-        controller.act(np.array(observe(reference=math.nan)))

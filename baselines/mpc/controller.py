@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
+from crane_env.support.fixed import fixed
+
+BUILD_ANOTHER = "build another controller with make_controller"
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,8 @@ class Plan:
     """Answer of a solver.
 
     Attributes:
-        moves: trolley accelerations u_0 ... u_{N_c - 1} [m/s^2], shape (N_c,); None if it failed.
+        moves: trolley accelerations u_0 ... u_{N_c - 1} [m/s^2], shape (N_c,); None if it failed,
+            which moves that are not finite count as too.
         iterations: solver iterations spent.
         converged: False if the moves are the best found, but not optimal: the iterations ran out.
     """
@@ -63,17 +68,16 @@ class PredictiveController(Controller):
     Args:
         crane: nominal parameters; the true crane may differ.
         settings: the optimal control problem.
-
-    Attributes:
-        crane: the nominal parameters.
-        settings: the optimal control problem.
-        limits: acceleration and velocity limits of the moves.
     """
 
+    crane: CraneParameters = fixed("crane", BUILD_ANOTHER, "The nominal parameters.")
+    settings: MpcSettings = fixed("settings", BUILD_ANOTHER, "The optimal control problem.")
+    limits: TrolleyLimits = fixed("limits", BUILD_ANOTHER, "Limits of the moves.")
+
     def __init__(self, crane: CraneParameters, settings: MpcSettings) -> None:
-        self.crane = crane
-        self.settings = settings
-        self.limits = TrolleyLimits(crane, settings)
+        self._crane = crane
+        self._settings = settings
+        self._limits = TrolleyLimits(crane, settings)
         self.reset()
 
     @final
@@ -95,10 +99,11 @@ class PredictiveController(Controller):
         """First move of a new plan; see `Controller.act`."""
         measured = finite_observation(observation)
         count, age = self.settings.control_horizon, self._schedule_age
-        plan = self._plan(measured, self._schedule[age : age + count])
+        with np.errstate(all="ignore"):  # numbers that overflow are a failed solve
+            plan = self._plan(measured, self._schedule[age : age + count])
         self._solves += 1
         self._iterations += plan.iterations
-        if plan.moves is not None:
+        if plan.moves is not None and all(map(math.isfinite, plan.moves.tolist())):
             self._schedule = np.empty(2 * count)
             self._schedule[:count] = plan.moves
             self._schedule[count:] = plan.moves[-1]
@@ -113,7 +118,7 @@ class PredictiveController(Controller):
             acceleration = float(self._schedule[age])
             self._schedule_age = age + 1
         else:
-            acceleration = -measured.trolley_velocity / self.crane.control_period
+            acceleration = math.nan  # for which `saturate` brakes
             self._braking_steps += 1
         return np.array([self.limits.saturate(acceleration, measured.trolley_velocity)])
 
@@ -139,3 +144,30 @@ class PredictiveController(Controller):
             shifted_moves: the last plan shifted to now, its last move repeated, shape (N_c,)
                 [m/s^2]; zeros after a reset.
         """
+
+
+class NativeSolverController(PredictiveController):
+    """A predictive controller whose solver lives outside Python and has no state to copy.
+
+    Copies and pickles carry what Python knows, the last plan and the statistics included, and pose
+    the problem to a solver of their own.
+    """
+
+    def __init__(self, crane: CraneParameters, settings: MpcSettings) -> None:
+        super().__init__(crane, settings)
+        self._solver = self._pose()
+
+    @abstractmethod
+    def _pose(self) -> Any:
+        """States the problem to the solver, from what `__init__` was given."""
+
+    @final
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the solver."""
+        return {name: value for name, value in vars(self).items() if name != "_solver"}
+
+    @final
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Takes what a copy carries and poses the problem anew."""
+        vars(self).update(state)
+        self._solver = self._pose()

@@ -10,154 +10,27 @@ At step k, for the state x = (s', theta, theta') and acceleration u = s'' held o
                 low_i <= s'_i <= high_i            i = 1 ... N_c, see `TrolleyLimits`
                 u_i = u_{N_c-1} or 0               i = N_c ... N_p - 1, the tail
 
-A(l), B(l) are the matrix exponential of eq. (3) over T, by its series; the first state, the
-position, enters neither the cost nor the limits and is left out. The problem is built once, as a
-disciplined parametrised program, and solved by Clarabel: of the solvers that come with CVXPY it
-alone is accurate (1e-7 m/s^2) within a control period (6 ms). DAQP takes 60 ms on this sparse form,
-OSQP 33 ms for 6e-7 m/s^2, SCS seconds.
+A(l), B(l) are the matrix exponential of eq. (3) over T; the first state, the position, enters
+neither the cost nor the limits and is left out. The problem is built once, as a disciplined
+parametrised program, and solved by Clarabel: of the solvers that come with CVXPY it alone is
+accurate (1e-7 m/s^2) within a control period (6 ms). DAQP takes 60 ms on this sparse form, OSQP
+33 ms for 6e-7 m/s^2, SCS seconds.
 """
 
 from __future__ import annotations
 
 import warnings
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.mpc.controller import Plan, PredictiveController
+from baselines.mpc.controller import NativeSolverController, Plan
 from baselines.mpc.prediction.cable import assumed_length
 from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from crane_env.support.extras import require
-
-
-@final
-class Equation6Mpc(PredictiveController):
-    """Receding horizon on eq. (6) in CVXPY.
-
-    Args:
-        crane: nominal parameters.
-        settings: the optimal control problem.
-        fixed_length: length of the model [m], ref. [18]; None: the measured one, Assumption A.
-
-    Raises:
-        ImportError: CVXPY is not installed; the message names the extra.
-    """
-
-    def __init__(
-        self, crane: CraneParameters, settings: MpcSettings, fixed_length: float | None
-    ) -> None:
-        super().__init__(crane, settings)
-        self._fixed_length = fixed_length
-        self._cvxpy = require("cvxpy", extra="mpc")
-        self._pose()
-
-    def _pose(self) -> None:
-        """States the problem; its parameters are set anew at each step."""
-        cp, cost = self._cvxpy, self.settings.cost
-        horizon, moves = self.settings.prediction_horizon, self.settings.control_horizon
-        lowest, highest = self.limits.acceleration_range
-
-        self._A = cp.Parameter((3, 3))
-        self._B = cp.Parameter((3, 1))
-        self._length = cp.Parameter(nonneg=True)
-        self._measured = cp.Parameter(3)
-        self._reference = cp.Parameter()
-        self._slowest = cp.Parameter(moves)
-        self._fastest = cp.Parameter(moves)
-
-        self._u = cp.Variable((1, moves))
-        x = cp.Variable((3, horizon + 1))
-        velocity, sway, sway_rate = x[0, 1:], x[1, 1:], x[2, 1:]
-        payload_velocity = velocity + self._length * sway_rate
-        sway_term = {
-            "displacement": self._length * sway,
-            "angle": sway,
-            "printed": sway - self._reference,
-        }[cost.sway_term]
-
-        objective = (
-            cp.sum_squares(payload_velocity - self._reference)
-            + cost.sway_weight * cp.sum_squares(sway_term)
-            + cost.acceleration_weight * cp.sum_squares(self._u)
-        )
-        constraints = [
-            x[:, 0] == self._measured,
-            x[:, 1:] == self._A @ x[:, :-1] + self._B @ (self._u @ self._held()),
-            self._u >= lowest,
-            self._u <= highest,
-            velocity[:moves] >= self._slowest,
-            velocity[:moves] <= self._fastest,
-        ]
-        self._problem = cp.Problem(cp.Minimize(objective), constraints)
-
-    def _held(self) -> NDArray[np.float64]:
-        """Which move acts at which step: 1 where it does, shape (N_c, N_p)."""
-        moves, horizon = self.settings.control_horizon, self.settings.prediction_horizon
-        held = np.eye(moves, horizon)
-        if self.settings.tail == "hold":
-            held[-1, moves:] = 1.0
-        return held
-
-    def _plan(self, observation: Observation, shifted_moves: NDArray[np.float64]) -> Plan:
-        length = self._fixed_length
-        if length is None:
-            length = assumed_length(observation, self.crane.cable_length_min)
-        self._A.value, self._B.value = self._discretised(length)
-        self._length.value = length
-        velocity = observation.trolley_velocity
-        self._measured.value = np.array([velocity, observation.sway_angle, observation.sway_rate])
-        self._reference.value = observation.travel_reference
-        moves = self.settings.control_horizon
-        lower, upper = self.limits.bounds(velocity)
-        self._slowest.value = velocity + lower[moves:]
-        self._fastest.value = velocity + upper[moves:]
-        return self._solve()
-
-    def _discretised(self, length: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A(l), shape (3, 3), and B(l), shape (3, 1), of eq. (3) for an input held over T."""
-        continuous = np.zeros((4, 4))
-        continuous[:3, :3] = np.array([[0, 0, 0], [0, 0, 1], [0, -self.crane.gravity / length, 0]])
-        continuous[:3, 3] = (1.0, 0.0, -1.0 / length)
-        step = continuous * self.crane.control_period
-        term = held = np.eye(4)
-        order = 0
-        while np.abs(term).max() > SERIES_END:
-            order += 1
-            term = term @ step / order
-            held = held + term
-        return held[:3, :3], held[:3, 3:]
-
-    def _solve(self) -> Plan:
-        """Solves the problem with the parameters that are set; any doubt counts as a failure."""
-        cp = self._cvxpy
-        with warnings.catch_warnings():
-            # What CVXPY warns of as inaccurate is within the reduced tolerances of `ACCURACY`.
-            warnings.simplefilter("ignore")
-            try:
-                self._problem.solve(solver=cp.CLARABEL, warm_start=False, **ACCURACY)
-            except cp.SolverError:
-                return Plan(None, 0)
-        iterations = int(self._problem.solver_stats.num_iters or 0)
-        if self._problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-            return Plan(None, iterations)
-        return Plan(np.asarray(self._u.value)[0], iterations)
-
-
-def linear_cvxpy(crane: CraneParameters, settings: MpcSettings) -> Equation6Mpc:
-    """`linear` by the readable statement."""
-    return Equation6Mpc(crane, settings, settings.model_cable_length)
-
-
-def adaptive_cvxpy(crane: CraneParameters, settings: MpcSettings) -> Equation6Mpc:
-    """`adaptive` by the readable statement."""
-    return Equation6Mpc(crane, settings, None)
-
-
-SERIES_END = 1e-18
-"""Terms of the matrix exponential's series that are negligible."""
 
 ACCURACY = {
     "tol_gap_abs": 1e-14,
@@ -175,3 +48,121 @@ Near a weakly active limit a gap of 1e-12 still leaves 3e-5 m/s^2, so Clarabel i
 rounding stops it, which in one of a thousand states is just short of 1e-14. It is accurate there
 because its linear systems are refined to the last digit; what misses the reduced tolerances failed.
 """
+
+
+@final
+class Equation6Mpc(NativeSolverController):
+    """Receding horizon on eq. (6) in CVXPY.
+
+    Args:
+        crane: nominal parameters.
+        settings: the optimal control problem.
+        fixed_length: length of the model [m], ref. [18]; None: the measured one, Assumption A.
+
+    Raises:
+        ImportError: CVXPY is not installed; the message names the extra.
+    """
+
+    def __init__(
+        self, crane: CraneParameters, settings: MpcSettings, fixed_length: float | None
+    ) -> None:
+        self._fixed_length = fixed_length
+        super().__init__(crane, settings)
+
+    def _pose(self) -> Any:
+        """States the problem; its parameters are set anew at each step."""
+        cp, cost = require("cvxpy", extra="mpc"), self.settings.cost
+        horizon, moves = self.settings.prediction_horizon, self.settings.control_horizon
+        lowest, highest = self.limits.acceleration_range
+
+        A, B = cp.Parameter((3, 3), name="A"), cp.Parameter((3, 1), name="B")
+        length = cp.Parameter(nonneg=True, name="length")
+        measured = cp.Parameter(3, name="measured")
+        reference = cp.Parameter(name="reference")
+        slowest, fastest = cp.Parameter(moves, name="slowest"), cp.Parameter(moves, name="fastest")
+
+        u = cp.Variable((1, moves), name="u")
+        x = cp.Variable((3, horizon + 1), name="x")
+        velocity, sway, sway_rate = x[0, 1:], x[1, 1:], x[2, 1:]
+        payload_velocity = velocity + length * sway_rate
+        sway_term = {
+            "displacement": length * sway,
+            "angle": sway,
+            "printed": sway - reference,
+        }[cost.sway_term]
+
+        objective = (
+            cp.sum_squares(payload_velocity - reference)
+            + cost.sway_weight * cp.sum_squares(sway_term)
+            + cost.acceleration_weight * cp.sum_squares(u)
+        )
+        constraints = [
+            x[:, 0] == measured,
+            x[:, 1:] == A @ x[:, :-1] + B @ (u @ self._held()),
+            u >= lowest,
+            u <= highest,
+            velocity[:moves] >= slowest,
+            velocity[:moves] <= fastest,
+        ]
+        return cp.Problem(cp.Minimize(objective), constraints)
+
+    def _held(self) -> NDArray[np.float64]:
+        """Which move acts at which step: 1 where it does, shape (N_c, N_p)."""
+        moves, horizon = self.settings.control_horizon, self.settings.prediction_horizon
+        held = np.eye(moves, horizon)
+        if self.settings.tail == "hold":
+            held[-1, moves:] = 1.0
+        return held
+
+    def _plan(self, observation: Observation, shifted_moves: NDArray[np.float64]) -> Plan:
+        length = self._fixed_length
+        if length is None:
+            length = assumed_length(observation, self.crane.cable_length_min)
+        velocity, moves = observation.trolley_velocity, self.settings.control_horizon
+        lower, upper = self.limits.bounds(velocity)
+        A, B = self._discretised(length)
+        values = {
+            "A": A,
+            "B": B,
+            "length": length,
+            "measured": np.array([velocity, observation.sway_angle, observation.sway_rate]),
+            "reference": observation.travel_reference,
+            "slowest": velocity + lower[moves:],
+            "fastest": velocity + upper[moves:],
+        }
+        for name, value in values.items():
+            self._solver.param_dict[name].value = value
+        return self._solve()
+
+    def _discretised(self, length: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A(l), shape (3, 3), and B(l), shape (3, 1), of eq. (3) for an input held over T."""
+        continuous = np.zeros((4, 4))
+        continuous[:3, :3] = np.array([[0, 0, 0], [0, 0, 1], [0, -self.crane.gravity / length, 0]])
+        continuous[:3, 3] = (1.0, 0.0, -1.0 / length)
+        held = require("scipy.linalg", extra="mpc").expm(continuous * self.crane.control_period)
+        return held[:3, :3], held[:3, 3:]
+
+    def _solve(self) -> Plan:
+        """Solves the problem with the parameters that are set; any doubt counts as a failure."""
+        cp, problem = require("cvxpy", extra="mpc"), self._solver
+        with warnings.catch_warnings():
+            # What CVXPY warns of as inaccurate is within the reduced tolerances of `ACCURACY`.
+            warnings.simplefilter("ignore")
+            try:
+                problem.solve(solver=cp.CLARABEL, warm_start=False, **ACCURACY)
+            except cp.SolverError:
+                return Plan(None, 0)
+        iterations = int(problem.solver_stats.num_iters or 0)
+        if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+            return Plan(None, iterations)
+        return Plan(np.asarray(problem.var_dict["u"].value)[0], iterations)
+
+
+def linear_cvxpy(crane: CraneParameters, settings: MpcSettings) -> Equation6Mpc:
+    """`linear` by the readable statement."""
+    return Equation6Mpc(crane, settings, settings.model_cable_length)
+
+
+def adaptive_cvxpy(crane: CraneParameters, settings: MpcSettings) -> Equation6Mpc:
+    """`adaptive` by the readable statement."""
+    return Equation6Mpc(crane, settings, None)

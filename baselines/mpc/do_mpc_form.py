@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.mpc.controller import Plan, PredictiveController
+from baselines.mpc.controller import NativeSolverController, Plan
 from baselines.mpc.prediction.cable import assumed_length
 from baselines.mpc.prediction.equation1 import sway_step
 from baselines.mpc.prediction.symbolic import numpy_on_symbols
@@ -24,7 +24,7 @@ from crane_env.support.extras import require
 
 
 @final
-class DoMpcNmpc(PredictiveController):
+class DoMpcNmpc(NativeSolverController):
     """Receding horizon on eq. (6) with model (1) under Assumption A, solved by do-mpc.
 
     Args:
@@ -36,17 +36,14 @@ class DoMpcNmpc(PredictiveController):
     """
 
     def __init__(self, crane: CraneParameters, settings: MpcSettings) -> None:
-        super().__init__(crane, settings)
-        self._do_mpc = require("do_mpc", extra="peers")
-        self._casadi = require("casadi", extra="mpc")
         self._cable_length = crane.cable_length_initial
         self._reference = 0.0
-        self._mpc = self._pose(self._model())
+        super().__init__(crane, settings)
 
     def _model(self) -> Any:
         """Model (1) at a constant length over one control period, cost included."""
-        crane, cost, casadi = self.crane, self.settings.cost, self._casadi
-        model = self._do_mpc.model.Model("discrete", "SX")
+        crane, cost, casadi = self.crane, self.settings.cost, require("casadi", extra="mpc")
+        model = require("do_mpc", extra="peers").model.Model("discrete", "SX")
         velocity = model.set_variable("_x", "velocity")
         angle = model.set_variable("_x", "angle")
         angle_rate = model.set_variable("_x", "angle_rate")
@@ -70,11 +67,12 @@ class DoMpcNmpc(PredictiveController):
         model.setup()
         return model
 
-    def _pose(self, model: Any) -> Any:
+    def _pose(self) -> Any:
         """The optimisation problem; its parameters are set anew at each step."""
+        model = self._model()
         settings, crane = self.settings, self.crane
         moves = settings.control_horizon
-        mpc = self._do_mpc.controller.MPC(model)
+        mpc = require("do_mpc", extra="peers").controller.MPC(model)
         mpc.settings.n_horizon = settings.prediction_horizon
         mpc.settings.t_step = crane.control_period
         mpc.settings.store_full_solution = False
@@ -108,7 +106,7 @@ class DoMpcNmpc(PredictiveController):
         return mpc
 
     def _plan(self, observation: Observation, shifted_moves: NDArray[np.float64]) -> Plan:
-        mpc, count = self._mpc, self.settings.control_horizon
+        mpc, count = self._solver, self.settings.control_horizon
         self._cable_length = assumed_length(observation, self.crane.cable_length_min)
         self._reference = observation.travel_reference
         velocity = observation.trolley_velocity

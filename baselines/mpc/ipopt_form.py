@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.mpc.controller import Plan, PredictiveController
+from baselines.mpc.controller import NativeSolverController, Plan
 from baselines.mpc.prediction.cable import CableRate, measured_cable_rate, null_cable_rate
 from baselines.mpc.prediction.problem import Horizon, Start
 from baselines.mpc.prediction.symbolic import NonlinearPrediction
@@ -26,6 +26,9 @@ from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from crane_env.support.extras import require
+
+ITERATION_LIMIT = 200
+"""Interior-point iterations per control period; about half a second."""
 
 DEFAULTS: Mapping[str, str | float] = MappingProxyType({})
 """IPOPT as it comes."""
@@ -38,7 +41,7 @@ of where it starts."""
 
 
 @final
-class IpoptNmpc(PredictiveController):
+class IpoptNmpc(NativeSolverController):
     """Receding horizon on eq. (6) with model (1), solved by IPOPT.
 
     Args:
@@ -60,40 +63,42 @@ class IpoptNmpc(PredictiveController):
         tolerance: float = 1e-8,
         ipopt_options: Mapping[str, str | float] = DEFAULTS,
     ) -> None:
-        super().__init__(crane, settings)
-        casadi = require("casadi", extra="mpc")
         self._cable_rate = cable_rate
         self._horizon = Horizon.of(crane, settings)
-        self._prediction = NonlinearPrediction(self._horizon, settings.control_horizon)
-        program = {
-            "x": self._prediction.moves,
-            "p": self._prediction.parameters,
-            "f": casadi.sumsqr(self._prediction.residuals),
-            "g": casadi.mtimes(self.limits.velocity_gain, self._prediction.moves),
-        }
-        options = {
-            "print_time": False,
-            "ipopt.print_level": 0,
-            "ipopt.sb": "yes",
+        self._options = {
             "ipopt.tol": tolerance,
             "ipopt.max_iter": ITERATION_LIMIT,
             **{f"ipopt.{name}": value for name, value in ipopt_options.items()},
         }
-        self._solver = casadi.nlpsol("nmpc", "ipopt", program, options)
+        super().__init__(crane, settings)
+
+    def _pose(self) -> Any:
+        """The prediction and a solver of eq. (6) in its symbols."""
+        casadi = require("casadi", extra="mpc")
+        prediction = NonlinearPrediction(self._horizon, self.settings.control_horizon)
+        program = {
+            "x": prediction.moves,
+            "p": prediction.parameters,
+            "f": casadi.sumsqr(prediction.residuals),
+            "g": casadi.mtimes(self.limits.velocity_gain, prediction.moves),
+        }
+        options = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", **self._options}
+        return prediction, casadi.nlpsol("nmpc", "ipopt", program, options)
 
     def _plan(self, observation: Observation, shifted_moves: NDArray[np.float64]) -> Plan:
         start = Start.of(observation, self._cable_rate, self._horizon)
         lower, upper = self.limits.bounds(observation.trolley_velocity)
         count = self.settings.control_horizon
-        solution = self._solver(
+        prediction, solver = self._solver
+        solution = solver(
             x0=shifted_moves,
-            p=self._prediction.parameter_values(start),
+            p=prediction.parameter_values(start),
             lbx=lower[:count],
             ubx=upper[:count],
             lbg=lower[count:],
             ubg=upper[count:],
         )
-        outcome = self._solver.stats()
+        outcome = solver.stats()
         iterations = int(outcome["iter_count"])
         moves = np.array(solution["x"], dtype=np.float64).reshape(count)
         if outcome["success"]:
@@ -111,7 +116,3 @@ def nmpc_a_ipopt(crane: CraneParameters, settings: MpcSettings) -> IpoptNmpc:
 def nmpc_b_ipopt(crane: CraneParameters, settings: MpcSettings) -> IpoptNmpc:
     """Nonlinear MPC under Assumption B, constant cable velocity."""
     return IpoptNmpc(crane, settings, measured_cable_rate)
-
-
-ITERATION_LIMIT = 200
-"""Interior-point iterations per control period; about half a second."""

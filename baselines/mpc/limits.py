@@ -16,6 +16,8 @@ the constraints have a solution for every v, whatever a_min <= 0 <= a_max. Below
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -74,9 +76,11 @@ class TrolleyLimits:
         """Nearest acceleration that the limits allow for the next control period [m/s^2].
 
         Args:
-            acceleration: wanted [m/s^2].
+            acceleration: wanted [m/s^2]; not a number is no wish, which brakes the trolley to rest.
             trolley_velocity: measured [m/s]; may lie beyond the limits.
         """
+        if math.isnan(acceleration):
+            acceleration = -trolley_velocity / self._period
         lowest, highest = self.acceleration_range
         slowest, fastest = self.velocity_range
         low = max(lowest, min((slowest - trolley_velocity) / self._period, highest))

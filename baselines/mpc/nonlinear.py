@@ -38,6 +38,27 @@ from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 
+TOLERANCE = 1e-6
+"""Estimated distance of the moves from a KKT point, largest entry [m/s^2]."""
+
+ITERATION_LIMIT = 100
+"""Gauss-Newton steps per control period: four milliseconds, while a slow solve takes 60."""
+
+FIRST_CONTRACTION = 0.5
+"""Assumed where no two full steps have shown it."""
+
+CONTRACTION_MIN = 0.1
+"""Least contraction believed: the first steps shrink faster than the later ones."""
+
+ARMIJO = 1e-4
+"""Share of the decrease that the slope promises which a step must bring."""
+
+FRACTION_MIN = 1e-6
+"""Shortest fraction of a step tried."""
+
+COST_ROUNDING = 1e-12
+"""Relative rounding error of the cost, which near the optimum hides any decrease."""
+
 
 class Linearisation(NamedTuple):
     """Eq. (6) near some moves.
@@ -185,7 +206,6 @@ class NonlinearMpc(PredictiveController):
         self._cable_rate = cable_rate
         self._method = method
 
-    @np.errstate(over="ignore", invalid="ignore")  # An overflow shows as a failed solve.
     def _plan(self, observation: Observation, shifted_moves: NDArray[np.float64]) -> Plan:
         start = Start.of(observation, self._cable_rate, self._problem.horizon)
         bounds = self.limits.bounds(observation.trolley_velocity)
@@ -210,25 +230,3 @@ def nmpc_a_rti(crane: CraneParameters, settings: MpcSettings) -> NonlinearMpc:
 def nmpc_b_rti(crane: CraneParameters, settings: MpcSettings) -> NonlinearMpc:
     """Nonlinear MPC under Assumption B by real-time iteration."""
     return NonlinearMpc(crane, settings, measured_cable_rate, real_time_iteration)
-
-
-TOLERANCE = 1e-6
-"""Estimated distance of the moves from a KKT point, largest entry [m/s^2]."""
-
-ITERATION_LIMIT = 100
-"""Gauss-Newton steps per control period: four milliseconds, while a slow solve takes 60."""
-
-FIRST_CONTRACTION = 0.5
-"""Assumed where no two full steps have shown it."""
-
-CONTRACTION_MIN = 0.1
-"""Least contraction believed: the first steps shrink faster than the later ones."""
-
-ARMIJO = 1e-4
-"""Share of the decrease that the slope promises which a step must bring."""
-
-FRACTION_MIN = 1e-6
-"""Shortest fraction of a step tried."""
-
-COST_ROUNDING = 1e-12
-"""Relative rounding error of the cost, which near the optimum hides any decrease."""

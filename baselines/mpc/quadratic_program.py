@@ -20,6 +20,15 @@ from numpy.typing import NDArray
 
 from crane_env.support.extras import require
 
+OPTIMAL = 1
+"""DAQP's exit flag of an optimal solution."""
+
+FEASIBILITY_TOLERANCE = 1e-9
+"""Largest violation of an inactive constraint, in the constraint's unit."""
+
+ITERATION_LIMIT = 1000
+"""Active sets tried before a solve counts as failed; a few milliseconds."""
+
 
 class QpSolution(NamedTuple):
     """What the solver found.
@@ -86,13 +95,3 @@ class QuadraticProgram:
         return QpSolution(
             minimiser if usable else None, info["lam"], int(info["iterations"]), int(exit_flag)
         )
-
-
-OPTIMAL = 1
-"""DAQP's exit flag of an optimal solution."""
-
-FEASIBILITY_TOLERANCE = 1e-9
-"""Largest violation of an inactive constraint, in the constraint's unit."""
-
-ITERATION_LIMIT = 1000
-"""Active sets tried before a solve counts as failed; a few milliseconds."""

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
+import numpy as np
+
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
+from crane_env.support.checks import choice, shown, whole, within
 from crane_env.support.fields import from_fields
 
 Tail = Literal["hold", "zero"]
+
+LONGEST = {"prediction_horizon": 2000, "control_horizon": 200}
+"""Longest horizons [control periods]: beyond them a plan takes longer than anyone waits."""
+
+MODEL_LENGTHS = (0.1, 1000.0)
+"""Cable lengths of a model [m]."""
+
+LARGEST = 1e9
+"""Limit of limits [m/s^2, m/s]: as good as none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,11 +30,11 @@ class MpcSettings:
     """One optimal control problem, shared by every predictive controller.
 
     Attributes:
-        prediction_horizon: N_p [control periods].
-        control_horizon: N_c, number of free moves [control periods].
+        prediction_horizon: N_p, at most 2000 [control periods].
+        control_horizon: N_c, number of free moves, at most 200 [control periods].
         cost: weights and sway term of eq. (6).
         tail: the input after N_c moves: "hold" the last move (the MPC convention) or "zero".
-        model_cable_length: constant length of the model of the linear MPC, ref. [18] [m].
+        model_cable_length: constant length of the linear MPC's model, ref. [18], 0.1 to 1000 [m].
         acceleration_limits: lowest and highest trolley acceleration [m/s^2]; None: the crane's.
         velocity_limits: lowest and highest trolley velocity [m/s]; None: the crane's.
 
@@ -41,22 +52,18 @@ class MpcSettings:
 
     def __post_init__(self) -> None:
         """Refuses settings that make no sense."""
-        for name in ("prediction_horizon", "control_horizon"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise ValueError(f"{name} must be a whole number of at least 1, not {value!r}.")
+        for name, longest in LONGEST.items():
+            value = whole(name, getattr(self, name), 1, longest + 1)
+            object.__setattr__(self, name, value)
         if self.control_horizon > self.prediction_horizon:
             raise ValueError(
                 f"control_horizon ({self.control_horizon}) must not exceed "
                 f"prediction_horizon ({self.prediction_horizon})."
             )
         object.__setattr__(self, "cost", StageCost.of(self.cost))
-        if self.tail not in get_args(Tail):
-            raise ValueError(f"Unknown tail {self.tail!r}; valid: {', '.join(get_args(Tail))}.")
-        length = self.model_cable_length
-        is_number = isinstance(length, (int, float)) and not isinstance(length, bool)
-        if not is_number or not math.isfinite(length) or length <= 0.0:
-            raise ValueError(f"model_cable_length must be a positive length, not {length!r}.")
+        choice("tail", self.tail, get_args(Tail))
+        length = within("model_cable_length", self.model_cable_length, *MODEL_LENGTHS, "m")
+        object.__setattr__(self, "model_cable_length", length)
         for name in ("acceleration_limits", "velocity_limits"):
             limits = getattr(self, name)
             if limits is not None:
@@ -91,12 +98,12 @@ class MpcSettings:
 
 
 def _checked_limits(name: str, limits: Any) -> tuple[float, float]:
-    try:
-        low, high = (float(limit) for limit in limits)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a pair of numbers, not {limits!r}.") from None
-    if not low < high or not low <= 0.0 <= high or math.isinf(high - low):
+    pair = limits.tolist() if isinstance(limits, np.ndarray) else limits
+    if not isinstance(pair, (list, tuple)) or len(pair) != 2:
+        raise ValueError(f"{name} must be a pair of numbers, not {shown(limits)}.")
+    low, high = (within(f"Each of {name}", limit, -LARGEST, LARGEST) for limit in pair)
+    if not low < high or not low <= 0.0 <= high:
         raise ValueError(
-            f"{name} must be a low and a higher finite limit that allow rest (0), not {limits!r}."
+            f"{name} must be a low and a higher limit that allow rest (0), not {shown(limits)}."
         )
     return low, high

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ from baselines.mpc.do_mpc_form import nmpc_a_do_mpc
 from baselines.mpc.ipopt_form import nmpc_a_ipopt
 from baselines.mpc.settings import MpcSettings
 from crane_env import CraneParameters, StageCost
+from tests.mpc.prediction.linear_crane import random_observation
 
 CRANE = CraneParameters()
 
@@ -19,30 +18,19 @@ CRANE = CraneParameters()
 @pytest.mark.parametrize(
     "settings",
     [
-        MpcSettings(),
+        MpcSettings(prediction_horizon=50),
         MpcSettings(prediction_horizon=40, tail="zero", cost=StageCost(sway_term="printed")),
     ],
 )
 def test_do_mpc_and_the_ipopt_reference_agree(settings: MpcSettings) -> None:
     peer = nmpc_a_do_mpc(CRANE, settings)
-    reference = nmpc_a_ipopt(CRANE, dataclasses.replace(settings))
+    reference = nmpc_a_ipopt(CRANE, settings)
     rng = np.random.default_rng(0)
     interior = 0
-    for _ in range(15):
-        state = np.array(
-            [
-                0.0,
-                rng.uniform(-2.0, 2.0),
-                rng.uniform(2.0, 10.0),
-                0.0,
-                rng.uniform(-0.2, 0.2),
-                rng.uniform(-0.2, 0.2),
-                rng.choice([-1.0, 0.0, 1.0]),
-                0.0,
-            ]
-        )
+    for _ in range(8):
+        state = np.array(random_observation(rng, sway=0.1)._replace(cable_rate=0.0))
         action = peer.act(state)[0]
         assert action == pytest.approx(reference.act(state)[0], abs=1e-5)
         interior += abs(action) < 5.0
-    assert interior >= 3
+    assert interior >= 2
     assert peer.statistics.failures == 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -53,7 +55,7 @@ def test_velocity_gain_sums_the_moves_so_far() -> None:
     fastest=st.floats(0.1, 3.0),
     moves=st.integers(1, 15),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_a_plan_exists_for_every_velocity_and_lopsided_limits(
     velocity: float, weakest: float, strongest: float, slowest: float, fastest: float, moves: int
 ) -> None:
@@ -98,3 +100,14 @@ def test_saturation_is_the_nearest_first_move_within_the_bounds(
     low = max(lower[0], lower[10] / PERIOD)
     high = min(upper[0], upper[10] / PERIOD)
     assert limits.saturate(wanted, velocity) == pytest.approx(np.clip(wanted, low, high), abs=1e-9)
+
+
+@given(velocity=st.floats(), wanted=st.floats())
+def test_saturation_lets_only_finite_accelerations_through(velocity: float, wanted: float) -> None:
+    assert -3.0 <= limits_of((-3.0, 2.0), (-0.7, 1.1)).saturate(wanted, velocity) <= 2.0
+
+
+def test_no_wish_at_all_brakes_the_trolley_to_rest() -> None:
+    limits = limits_of((-3.0, 2.0), (-0.7, 1.1))
+    for velocity, braking in ((0.5, -3.0), (0.02, -1.0), (0.0, 0.0), (-0.5, 2.0)):
+        assert limits.saturate(math.nan, velocity) == pytest.approx(braking)

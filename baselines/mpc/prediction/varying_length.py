@@ -40,6 +40,12 @@ from crane_env.parameters import CraneParameters
 
 _Array = NDArray[np.float64]
 
+TERMS = 10
+"""Terms of the power series."""
+
+SHARES = (0.0, 0.0, *(1.0 / (n * (n - 1)) for n in range(2, TERMS)))
+"""1 / (n (n - 1)) for n = 0 ... TERMS - 1, where it exists."""
+
 
 class TimeVaryingPrediction:
     """Residuals of eq. (6) over the horizon, as an affine function of the moves.
@@ -166,10 +172,3 @@ def free_map(
     length = cable_length + duration * cable_rate
     before, after = duration / (cable_length * cable_length), length * length / duration
     return angle_1, angle_2 * before, rate_1 * after, rate_2 * before * after
-
-
-TERMS = 10
-"""Terms of the power series."""
-
-SHARES = (0.0, 0.0, *(1.0 / (n * (n - 1)) for n in range(2, TERMS)))
-"""1 / (n (n - 1)) for n = 0 ... TERMS - 1, where it exists."""
