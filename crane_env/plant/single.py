@@ -19,20 +19,19 @@ are at most 1 % off, at the shortest cable.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from crane_env.observation import CraneState, is_sound, largest_state
 from crane_env.parameters import CraneParameters
 from crane_env.plant.drives import Drives, Stroke
 from crane_env.plant.outcome import Outcome
 from crane_env.plant.start import AT_REST, Start
+from crane_env.support.fixed import fixed
 
 SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
 """Places of the joints among positions and velocities."""
@@ -96,15 +95,17 @@ class Plant:
     """
 
     def __init__(self, parameters: CraneParameters) -> None:
-        self.parameters = parameters
+        self._parameters = parameters
         self.model = build_model(parameters)
         self.data = mujoco.MjData(self.model)
         self._bind()
         self.reset()
 
+    parameters: CraneParameters = fixed("parameters", "make a new Plant", "The crane.")
+
     def _bind(self) -> None:
         """Resolves names once and keeps views of the arrays that every step touches."""
-        model, data, parameters = self.model, self.data, self.parameters
+        model, data, parameters = self.model, self.data, self._parameters
         names = ("setpoint", "drive_error", "sway", "reach", "drum")
         order = tuple(int(model.joint(name).qposadr[0]) for name in names)
         if order != tuple(range(len(names))):
@@ -120,7 +121,7 @@ class Plant:
         """Parameters and full integration state: a copy continues bit for bit."""
         state = np.empty(mujoco.mj_stateSize(self.model, mujoco.mjtState.mjSTATE_INTEGRATION))
         mujoco.mj_getState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
-        return {"parameters": self.parameters, "state": state, "gains": self._cable_gains.copy()}
+        return {"parameters": self._parameters, "state": state, "gains": self._cable_gains.copy()}
 
     def __setstate__(self, saved: dict[str, object]) -> None:
         """Rebuilds the model and restores the state."""
@@ -136,7 +137,7 @@ class Plant:
         Raises:
             ValueError: a value outside its range.
         """
-        position, velocity = start.coordinates(self.parameters)
+        position, velocity = start.coordinates(self._parameters)
         self._put(position, velocity, position[DRUM])
 
     def _put(
@@ -173,14 +174,14 @@ class Plant:
         state, tension = self.measure()
         failed = not is_sound(state, self._largest)
         if failed:
-            begin = self.data.time - self.parameters.control_period
+            begin = self.data.time - self._parameters.control_period
             self._put(position, velocity, drum)
             self.data.time = begin
             state, tension = self.measure()
         return Outcome(state, tension, travel.acceleration, travel.limited, failed)
 
     def _set_cable_gains(self, unstretched_length: float) -> None:
-        parameters = self.parameters
+        parameters = self._parameters
         _, self._cable_gains[1], self._cable_gains[2] = cable_gains(
             parameters.cable_stiffness, parameters.cable_damping, unstretched_length
         )
@@ -206,44 +207,9 @@ class Plant:
         return float(self.data.time)
 
     @property
-    def trolley_position(self) -> float:
-        """Along the girder [m]."""
-        return float(self._position[SETPOINT] + self._position[DRIVE_ERROR])
-
-    @property
-    def trolley_velocity(self) -> float:
-        """[m/s]."""
-        return float(self._velocity[SETPOINT] + self._velocity[DRIVE_ERROR])
-
-    @property
-    def setpoint_position(self) -> float:
-        """Trolley position that the drive asks for [m]."""
-        return float(self._position[SETPOINT])
-
-    @property
     def setpoint_velocity(self) -> float:
         """Trolley velocity that the drive asks for [m/s]."""
         return float(self._velocity[SETPOINT])
-
-    @property
-    def sway_angle(self) -> float:
-        """From the vertical, > 0: payload ahead of the trolley [rad]."""
-        return float(self._position[SWAY])
-
-    @property
-    def sway_rate(self) -> float:
-        """[rad/s]."""
-        return float(self._velocity[SWAY])
-
-    @property
-    def cable_length(self) -> float:
-        """Sheave to payload [m]."""
-        return float(self._position[REACH])
-
-    @property
-    def cable_rate(self) -> float:
-        """Rate of the cable length, > 0 lengthens [m/s]."""
-        return float(self._velocity[REACH])
 
     @property
     def unstretched_length(self) -> float:
@@ -259,18 +225,3 @@ class Plant:
     def cable_tension(self) -> float:
         """Tension of the cable [N]; exactly 0 when slack."""
         return self.measure()[1]
-
-    @property
-    def drive_force(self) -> float:
-        """Force of the drive on the trolley [N]."""
-        loops = self.model.joint("drive_error")
-        return -float(
-            loops.stiffness[0] * self._position[DRIVE_ERROR]
-            + loops.damping[0] * self._velocity[DRIVE_ERROR]
-        )
-
-    @property
-    def payload_position(self) -> NDArray[np.float64]:
-        """Payload in the plane: along the girder, and height above the sheave [m], shape (2,)."""
-        reach, sway = self.cable_length, self.sway_angle
-        return np.array([self.trolley_position + reach * math.sin(sway), -reach * math.cos(sway)])

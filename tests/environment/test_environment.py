@@ -233,7 +233,7 @@ def test_the_speed_limit_and_the_limit_switch_are_reported() -> None:
     env.reset(seed=0, options={"trolley_position": 19.0, "trolley_velocity": 1.0})
     limited = [env.step(np.array([1.0]))[4]["drive_limited"] for _ in range(100)]
     assert limited[-1]
-    assert env.unwrapped.plant.trolley_position < 20.0
+    assert env.unwrapped.truth().trolley_position < 20.0
 
 
 def test_reset_options_place_the_crane_for_one_episode() -> None:

@@ -154,7 +154,10 @@ BAD_INPUT = {
     "preset": (("--parameters", "moon"), "must be a preset (paper, field), a JSON object or a fi"),
     "range": (("--parameters", '{"payload_mass": -1}'), "payload_mass must be a positive finite"),
     "field": (("--parameters", '{"mass": 1}'), "Unknown crane parameter 'mass'; valid: trolley_"),
-    "number": (("--parameters", '{"payload_mass": "x"}'), "payload_mass must be a number"),
+    "number": (
+        ("--parameters", '{"payload_mass": "x"}'),
+        "payload_mass must be a positive finite number",
+    ),
     "json": (("--settings", "{"), "settings must be a JSON object or a file with one: Expecting"),
     "list": (("--settings", "[1]"), "settings must be a JSON object or a file with one, not '[1]'"),
     "horizon": (("--settings", '{"control_horizon": 200}'), "must not exceed prediction_horizon"),

@@ -211,7 +211,7 @@ def test_the_chart_shows_what_has_been_drawn(crane: Drawn) -> None:
     before = crane.draw()
     for _ in range(60):
         crane.plant.step(1.0, 0.0)
-        crane.renderer._chart.add(crane.plant.time, 1.0, crane.plant.trolley_velocity)
+        crane.renderer._chart.add(crane.plant.time, 1.0, crane.plant.state().trolley_velocity)
     after = crane.renderer.draw(RELEASED, 1.0)
     assert after is not None
     assert changed(before, after)[chart].sum() > 50
