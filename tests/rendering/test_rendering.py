@@ -28,7 +28,7 @@ from crane_env.parameters import CraneParameters
 from crane_env.plant.single import Plant
 from crane_env.plant.start import Start
 from crane_env.rendering import canvas, opengl
-from crane_env.rendering.canvas import SMALLEST_PICTURE, Pace, WindowCanvas
+from crane_env.rendering.canvas import SMALLEST_PICTURE, WindowCanvas
 from crane_env.rendering.hall import floor_depth, hall, marks
 from crane_env.rendering.instruments import CHART_SPAN, Chart
 from crane_env.rendering.scene import CraneRenderer
@@ -138,15 +138,6 @@ def test_a_crane_with_another_cable_is_in_the_picture_too() -> None:
             assert not touches_edge(part)
 
 
-def test_payload_sinks_in_the_picture_in_proportion_to_the_cable(crane: Drawn) -> None:
-    lengths = np.array([2.0, 5.0, 8.0, 11.0])
-    rows = [centre(crate(crane.draw(cable_length=length)))[1] for length in lengths]
-    # The camera looks down by 3.4 degrees only, so the picture is linear within a pixel or two.
-    line = np.polynomial.Polynomial.fit(lengths, rows, 1)
-    assert np.abs(line(lengths) - rows).max() < 3.0
-    assert line.deriv()(0.0) > 10.0
-
-
 def test_camera_follows_the_trolley(crane: Drawn) -> None:
     places = (-15.0, 0.0, 3.3, 15.0)
     pictures = [crane.draw(trolley_position=place) for place in places]
@@ -157,22 +148,17 @@ def test_camera_follows_the_trolley(crane: Drawn) -> None:
         assert changed(one, other)[SCENE].sum() > 1000
 
 
-@pytest.mark.parametrize("button", Buttons._fields)
-def test_a_pressed_button_is_lit_in_the_direction_it_stands_for(crane: Drawn, button: str) -> None:
-    pressed = crane.draw(Buttons(**{button: True}))
-    lit = changed(pressed, crane.draw())
-    rows, columns = np.nonzero(lit)
-    assert lit.sum() > 1000
-    assert np.ptp(rows) < 60
-    assert np.ptp(columns) < 60
-    assert rows.min() >= SCENE.stop
-    colour = pressed[lit].mean(axis=0)
-    assert colour[1] > 1.5 * max(colour[0], colour[2])
-    # Away from the middle of the pendant, the way that the payload goes.
-    pendant = np.array([WIDTH - 14 - 78, HEIGHT - 92])
-    step = np.array([columns.mean(), rows.mean()]) - pendant
-    direction = {"forward": (1, 0), "backward": (-1, 0), "up": (0, -1), "down": (0, 1)}[button]
-    assert step / np.linalg.norm(step) == pytest.approx(np.array(direction), abs=0.1)
+def test_each_pressed_button_is_lit_in_green_at_a_place_of_its_own(crane: Drawn) -> None:
+    still, places = crane.draw(), []
+    for button in Buttons._fields:
+        pressed = crane.draw(Buttons(**{button: True}))
+        lit = changed(pressed, still)
+        red, green, blue = pressed[lit].mean(axis=0)
+        assert green > 1.5 * max(red, blue)
+        places.append(np.argwhere(lit).mean(axis=0))
+    forward, backward, up, down = places
+    assert forward[1] > backward[1]
+    assert up[0] < down[0]
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -187,35 +173,6 @@ def test_velocities_are_arrows_that_point_their_way_from_the_payload(
         assert ahead.max() > 12
         assert ahead.max() > -2 * ahead.min()
     assert not (blue(still) & ~blue(moving)).any()
-
-
-def test_an_arrow_is_as_long_as_its_velocity(crane: Drawn) -> None:
-    def reach(velocity: float) -> int:
-        still = crane.draw(cable_length=6.0)
-        moving = crane.draw(cable_length=6.0, trolley_velocity=velocity)
-        return int(np.ptp(np.nonzero(blue(moving) & ~blue(still))[1]))
-
-    assert reach(2.0) == pytest.approx(2 * reach(1.0), rel=0.1)
-
-
-def test_numbers_change_with_the_state(crane: Drawn) -> None:
-    numbers = (slice(SCENE.stop, HEIGHT), slice(0, 228))
-    still = crane.draw()
-    for state in ({"cable_length": 5.0}, {"sway_angle": 0.1}, {"trolley_velocity": 0.5}):
-        assert changed(still, crane.draw(**state))[numbers].any()
-    assert not changed(still, crane.draw())[numbers].any()
-
-
-def test_the_chart_shows_what_has_been_drawn(crane: Drawn) -> None:
-    chart = (slice(SCENE.stop, HEIGHT), slice(280, WIDTH - 190))
-    before = crane.draw()
-    for _ in range(60):
-        crane.plant.step(1.0, 0.0)
-        crane.renderer._chart.add(crane.plant.time, 1.0, crane.plant.state().trolley_velocity)
-    after = crane.renderer.draw(RELEASED, 1.0)
-    assert after is not None
-    assert changed(before, after)[chart].sum() > 50
-    assert not changed(before, crane.draw())[chart].any()
 
 
 def test_drawing_does_not_touch_the_plant(crane: Drawn) -> None:
@@ -291,17 +248,6 @@ def test_the_chart_keeps_its_span_and_never_more_than_a_figure_can_hold(gaps: li
     assert len(times) <= 1001
 
 
-@pytest.mark.parametrize("period", [0.001, 0.01, 0.02, 0.1])
-def test_the_chart_is_full_at_every_control_period(period: float) -> None:
-    chart = Chart(1.0)
-    for k in range(round(12.0 / period)):
-        chart.add(k * period, 0.0, 0.0)
-    times = chart.samples()[:, 0]
-    assert len(times) <= 1001
-    assert times[-1] - times[0] == pytest.approx(CHART_SPAN, abs=0.1)
-    assert np.diff(times).max() < 0.031 + period
-
-
 def test_a_new_episode_begins_a_new_chart() -> None:
     chart = Chart(1.0)
     for time in (0.0, 0.02, 0.04, 0.0):
@@ -368,17 +314,6 @@ def test_a_setting_that_cannot_draw_is_named(
     with pytest.raises(RuntimeError, match=complaint) as caught:
         opengl.offscreen_context(64, 64)
     assert_says_what_to_do(caught.value)
-
-
-def test_a_back_end_that_fails_is_named_with_its_reason(bare: pytest.MonkeyPatch) -> None:
-    def broken(module: str) -> None:
-        raise AttributeError(f"{module} found no device")
-
-    bare.setenv("MUJOCO_GL", "osmesa")
-    bare.setattr(opengl.importlib, "import_module", broken)
-    with pytest.raises(RuntimeError, match=r"osmesa does not work: mujoco\.osmesa found no") as e:
-        opengl.offscreen_context(64, 64)
-    assert_says_what_to_do(e.value)
 
 
 @pytest.mark.parametrize(
@@ -502,14 +437,6 @@ def test_a_window_on_a_slow_computer_leaves_out_pictures_and_keeps_real_time(
     assert 90 <= len(window.shown) <= 112
 
 
-def test_a_window_that_is_too_slow_still_shows_pictures(
-    monkeypatch: pytest.MonkeyPatch, clock: Clock
-) -> None:
-    window = FakeWindow(clock, cost=1.0)
-    play(monkeypatch, window)(10.0)
-    assert len(window.shown) > 10
-
-
 def test_a_window_that_a_person_closes_stays_closed_and_nothing_waits_for_it(
     monkeypatch: pytest.MonkeyPatch, clock: Clock
 ) -> None:
@@ -523,18 +450,6 @@ def test_a_window_that_a_person_closes_stays_closed_and_nothing_waits_for_it(
     assert window.freed == 1
     assert clock.now == closed
     assert len(window.shown) == pictures
-
-
-def test_simulated_time_that_jumps_starts_level_again(clock: Clock) -> None:
-    pace = Pace()
-    assert pace.lead(5.0) == 0.0
-    assert pace.lead(5.02) == pytest.approx(0.02)
-    clock.now += 0.1
-    assert pace.lead(5.02) == pytest.approx(-0.08)
-    assert pace.lead(0.0) == 0.0
-    assert pace.lead(0.02) == pytest.approx(0.02)
-    clock.now += 60.0
-    assert pace.lead(0.04) == 0.0
 
 
 # In processes of their own: what is imported, how a program ends, a real window.
