@@ -19,7 +19,6 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
-import crane_env
 from crane_env import ButtonEvent, Buttons, CraneParameters, Observation, StageCost
 from crane_env.environment.single import OILCraneEnv
 from crane_env.operators.base import ScheduledOperator
@@ -253,25 +252,6 @@ def test_reset_options_place_the_crane_for_one_episode() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"length": 4.0}, "Unknown reset option 'length'; valid: cable_length"),
-        ({"cable_length": 40.0}, "cable_length must be from 1 to 12 m, not 40.0"),
-        ({"operator": "nobody"}, "nobody"),
-    ],
-)
-def test_wrong_reset_options_are_refused_and_the_state_stays(
-    options: dict[str, Any], sentence: str
-) -> None:
-    env = make()
-    env.reset(seed=0)
-    twin = copy.deepcopy(env)
-    with pytest.raises(ValueError, match=sentence):
-        env.reset(options=options)
-    assert digest([env.step(np.zeros(1))]) == digest([twin.step(np.zeros(1))])
-
-
-@pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
         ({"seed": 99, "options": {"cable_length": 99.0}}, "cable_length must be from 1 to 12 m"),
@@ -279,7 +259,7 @@ def test_wrong_reset_options_are_refused_and_the_state_stays(
         ({"seed": 99, "options": {"cable_length": "5"}}, "cable_length must be a finite number"),
         ({"seed": 99, "options": {"operator": "nobody"}}, "nobody"),
         ({"seed": 99, "options": [1]}, "Reset options must be a mapping"),
-        ({"seed": 99, "options": {1: 2.0}}, "Unknown reset option 1"),
+        ({"seed": 99, "options": {1: 2.0}}, "Unknown reset option 1; valid: cable_length"),
         ({"seed": 2**63}, "A seed must be a whole number of at least 0 and below"),
         (
             {"seed": 99, "options": {"trolley_position": 19.7, "trolley_velocity": 1.0}},
@@ -287,7 +267,7 @@ def test_wrong_reset_options_are_refused_and_the_state_stays(
         ),
     ],
 )
-def test_a_refused_reset_leaves_no_trace_in_the_next_episode(
+def test_a_refused_reset_leaves_no_trace_in_this_episode_and_the_next(
     arguments: dict[str, Any], sentence: str
 ) -> None:
     env, untouched = make(), make()
@@ -295,6 +275,7 @@ def test_a_refused_reset_leaves_no_trace_in_the_next_episode(
         each.reset(seed=1)
     with pytest.raises(ValueError, match=sentence):
         env.reset(**arguments)
+    assert digest([env.step(np.zeros(1))]) == digest([untouched.step(np.zeros(1))])
     assert digest([env.reset()]) == digest([untouched.reset()])
 
 
@@ -440,9 +421,3 @@ def test_a_gymnasium_wrapper_rescales_the_action_for_a_learner() -> None:
     env.reset(seed=0)
     info = env.step(np.array([0.5]))[4]
     assert info["acceleration"] == pytest.approx(2.5, rel=1e-6)
-
-
-def test_a_crane_field_preset_plays() -> None:
-    rows = play(make(parameters="field"), 0, 500)
-    assert np.isfinite([row[0] for row in rows]).all()
-    assert crane_env.CraneParameters.field().acceleration_max == 0.3
