@@ -390,7 +390,7 @@ def test_nonsense_is_refused_with_what_is_allowed() -> None:
         episode_specs([], ["random"], [0], SHORT)
     with pytest.raises(ValueError, match="Unknown controller 'nobody'; valid: manual, linear"):
         check_controllers(specs_of("nobody"))
-    with pytest.raises(ValueError, match="no controller factory at '.*:nobody'"):
+    with pytest.raises(ValueError, match=r"no controller factory at '.*:nobody'"):
         check_controllers(specs_of(f"{STUBS}:nobody"))
     with pytest.raises(ImportError, match="'nowhere:nobody' cannot be imported"):
         check_controllers(specs_of("nowhere:nobody"))
