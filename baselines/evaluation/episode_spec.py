@@ -22,8 +22,10 @@ import gymnasium
 from baselines.evaluation.provenance import code_identity
 from baselines.mpc.settings import MpcSettings
 from baselines.registry import CONTROLLERS, make_controller, settings_type
-from crane_env import CraneParameters, Trajectory, make_operator, run_episode
+from crane_env import CraneParameters, Trajectory, run_episode
 from crane_env.controller import Controller
+from crane_env.operators.registry import FAMILIES, operator_program
+from crane_env.support.factory import is_place
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,8 +91,9 @@ class EpisodeSpec:
     @functools.cached_property
     def key(self) -> str:
         """Digest of the specification and the code, 12 hexadecimal digits."""
-        own = [self.controller, factory_identity(self.controller), self.operator, self.seed]
-        return digest([own, self.setup.key])[:12]
+        own = [factory_identity(name) for name in (self.controller, self.operator_name)]
+        given = [self.controller, self.operator, self.seed, self.setup.key]
+        return digest([own, given])[:12]
 
     @classmethod
     def of(cls, mapping: Mapping[str, Any]) -> EpisodeSpec:
@@ -126,20 +129,6 @@ def episode_specs(
     if not specs:
         raise ValueError("There is nothing to play: name a controller, an operator and a seed.")
     return specs
-
-
-def operator_program(name: str) -> dict[str, Any]:
-    """Program of an operator with all its fields, from its name.
-
-    Raises:
-        ValueError: an unknown name or a malformed script.
-        FileNotFoundError: a script that is not there.
-    """
-    program: Any = getattr(make_operator(name), "program")  # noqa: B009  names make programs
-    fields = dataclasses.asdict(program)
-    # Tuples become lists, so that a program is the same before and after its way through JSON.
-    plain: dict[str, Any] = json.loads(json.dumps(fields))
-    return plain
 
 
 def play(spec: EpisodeSpec) -> Trajectory:
@@ -180,11 +169,11 @@ def build_controller(spec: EpisodeSpec) -> Controller:
 
 
 @functools.cache
-def factory_identity(controller: str) -> str:
-    """Digest of the file of a controller that is none of the registry's; empty for those."""
-    if controller in CONTROLLERS:
+def factory_identity(name: str) -> str:
+    """Digest of the file of a factory that is the user's own; empty for the registries' names."""
+    if name in CONTROLLERS or not is_place(name) or name.partition(":")[0] in FAMILIES:
         return ""
-    found = importlib.util.find_spec(controller.partition(":")[0])
+    found = importlib.util.find_spec(name.partition(":")[0])
     if found is None or found.origin is None:
         return ""
     return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -95,6 +96,28 @@ def own_operator(spec: OperatorSpec) -> Operator:
             f"Each environment needs an operator of its own, and {shown(operator)} cannot be "
             f"copied: {error}."
         ) from error
+
+
+def operator_program(name: str) -> dict[str, Any]:
+    """Mapping of an operator with all its fields, from its name, which `make_operator` takes back.
+
+    It is the same before and after its way through JSON. A script's file need not be there any
+    more; of an operator of your own that is no dataclass, the name is all.
+
+    Raises:
+        ValueError: an unknown name or a malformed script.
+        FileNotFoundError: there is no such script.
+        ImportError: the module of a factory of your own cannot be imported.
+    """
+    made = make_operator(name)
+    program = getattr(made, "program", made)
+    if not dataclasses.is_dataclass(program) or isinstance(program, type):
+        return {"name": name}
+    try:
+        described: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(program)))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"The fields of operator {name!r} are no plain data: {error}.") from error
+    return {**described, "name": name}
 
 
 def _program(name: object, fields: Mapping[str, Any]) -> Any:

@@ -16,18 +16,13 @@ import baselines.evaluation.episode_spec
 import crane_env
 from baselines.evaluation import provenance
 from baselines.evaluation.comparison import check_controllers, compare, index_values
-from baselines.evaluation.episode_spec import (
-    EpisodeSpec,
-    Setup,
-    episode_specs,
-    operator_program,
-    play,
-)
+from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs, play
 from baselines.evaluation.results import PARTIAL_AGE, EpisodeResult, ResultsFolder
 from baselines.evaluation.tables import lowest, mean_and_deviation
 from baselines.evaluation.worker import Task
 from baselines.mpc.settings import MpcSettings
 from crane_env import CraneParameters, Trajectory
+from crane_env.operators.registry import operator_program
 
 SHORT = Setup(max_steps=120)
 """Manoeuvre 1 presses its travel button at step 92."""
@@ -162,6 +157,15 @@ def test_a_setup_and_a_specification_survive_json_with_their_keys() -> None:
         assert again == task
         assert again.spec.key == spec.key
         assert again.spec.setup.key == setup.key
+
+
+def test_an_operator_of_ones_own_is_played_and_its_code_is_in_the_key() -> None:
+    (spec,) = specs_of("manual", operators=("tests.operators.test_operators:EverySecond",))
+    again = Task.of_line(Task(spec, spec.key, "folder", "metrics").to_line()).spec
+    assert again == spec
+    assert play(again).travel_reference.any()
+    assert baselines.evaluation.episode_spec.factory_identity(spec.operator_name)
+    assert not baselines.evaluation.episode_spec.factory_identity("random")
 
 
 def test_every_part_of_a_specification_changes_its_key() -> None:

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from crane_env.observation import CraneState
 from crane_env.operators.base import RELEASED, ButtonEvent, Buttons, ScheduledOperator
 from crane_env.operators.manoeuvre import RandomManoeuvre
-from crane_env.operators.registry import make_operator, own_operator
+from crane_env.operators.registry import make_operator, operator_program, own_operator
 from crane_env.operators.script import ButtonScript, write_script
 from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
 from crane_env.operators.table1 import Table1Manoeuvre
@@ -126,8 +126,8 @@ def leaving() -> None:
 def test_an_operator_or_program_of_the_users_own_comes_by_its_factorys_place() -> None:
     assert isinstance(make_operator(f"{__name__}:EverySecond"), EverySecond)
     assert program_of(f"{__name__}:seldom") == seldom()
-    mapping = {**dataclasses.asdict(seldom()), "name": f"{__name__}:seldom"}
-    assert program_of(json.loads(json.dumps(mapping))) == seldom()
+    assert program_of(operator_program(f"{__name__}:seldom")) == seldom()
+    assert operator_program(f"{__name__}:EverySecond") == {"name": f"{__name__}:EverySecond"}
     for factory, reason in (
         ("nobody", "must return a program, .* not None"),
         ("missing", "must return a program, .* not None"),
