@@ -1,4 +1,4 @@
-"""Options: what the arguments of `reset` say for one crane or for each of many."""
+"""Options: what the arguments of `reset` and `step` say for one crane or for each of many."""
 
 from __future__ import annotations
 
@@ -105,3 +105,18 @@ def seeds_of_each(seed: object, count: int) -> list[int | None]:
             f"A list of seeds needs one for each of the {count} environments, not {len(seed)}."
         )
     return [None if one is None else checks.seed(one) for one in seed]
+
+
+def accelerations(actions: object, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Actions as an array of this shape, of numbers that may yet be infinite.
+
+    Raises:
+        ValueError: another shape, or entries that are no real numbers.
+    """
+    array = np.asarray(actions)
+    if array.shape != shape or array.dtype.kind not in "fiu":
+        raise ValueError(
+            f"An action must be an array of numbers of shape {shape}, "
+            f"not of {array.dtype} of shape {array.shape}."
+        )
+    return array

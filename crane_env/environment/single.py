@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from crane_env.environment.options import read_options, start_of
+from crane_env.environment.options import accelerations, read_options, start_of
 from crane_env.environment.pictures import Pictures
 from crane_env.environment.report import StepRecord, report_period, report_start
 from crane_env.observation import CraneState, Observation, observation_space
@@ -222,7 +222,9 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         Raises:
             ValueError: the action has another shape or is not finite; the state stays as it was.
         """
-        asked = self._checked(action)
+        asked = float(accelerations(action, (1,)).item())
+        if not math.isfinite(asked):
+            raise ValueError(f"An action must be a finite acceleration, not {asked} m/s^2.")
         limit = self._parameters.acceleration_max
         travel_reference, hoist_reference = self._references
         outcome = self._plant.step(min(max(asked, -limit), limit), hoist_reference)
@@ -260,15 +262,6 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the recorder: a copy continues bit for bit and draws for itself."""
         return {**self.__dict__, "recorder": None}
-
-    def _checked(self, action: NDArray[Any]) -> float:
-        array = np.asarray(action)
-        if array.shape != (1,):
-            raise ValueError(f"An action has shape (1,), not {array.shape}.")
-        asked = float(array.item())
-        if not math.isfinite(asked):
-            raise ValueError(f"An action must be a finite acceleration, not {asked} m/s^2.")
-        return asked
 
     def _read_buttons(self, state: CraneState) -> None:
         time = self._step_index * self._parameters.control_period

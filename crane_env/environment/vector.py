@@ -14,6 +14,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from crane_env.environment.options import (
+    accelerations,
     chosen_by,
     read_options,
     seeds_of_each,
@@ -394,10 +395,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
     def _checked_actions(
         self, actions: NDArray[Any], moving: NDArray[np.bool_]
     ) -> NDArray[np.float64]:
-        array = np.asarray(actions, dtype=np.float64)
-        if array.shape != (self.num_envs, 1):
-            raise ValueError(f"Actions have shape ({self.num_envs}, 1), not {array.shape}.")
-        asked = np.where(moving, array[:, 0], 0.0)
+        array = accelerations(actions, (self.num_envs, 1))[:, 0].astype(np.float64)
+        asked = np.where(moving, array, 0.0)
         bad = np.flatnonzero(~np.isfinite(asked))
         if bad.size:
             raise ValueError(

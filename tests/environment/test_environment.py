@@ -202,14 +202,15 @@ def test_references_follow_the_buttons_by_equations_4_and_5() -> None:
 
 
 @pytest.mark.parametrize(
-    "bad", [np.zeros(2), np.zeros((1, 1)), 0.0, np.array([np.nan]), np.array([np.inf])]
+    "bad",
+    [np.zeros(2), np.zeros((1, 1)), 0.0, [np.nan], np.array([np.inf]), ["5"], [True], [None], {}],
 )
 def test_a_poisoned_action_is_refused_and_the_state_stays(bad: Any) -> None:
     env = make()
     env.reset(seed=0)
     env.step(np.array([0.5]))
     twin = copy.deepcopy(env)
-    with pytest.raises(ValueError, match=r"An action (has shape|must be a finite)"):
+    with pytest.raises(ValueError, match="An action must be a"):
         env.unwrapped.step(bad)
     after = [env.step(np.array([0.1])) for _ in range(20)]
     assert digest(after) == digest([twin.step(np.array([0.1])) for _ in range(20)])

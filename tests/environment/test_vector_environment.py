@@ -208,9 +208,9 @@ def test_what_is_returned_is_the_users_own() -> None:
 @pytest.mark.parametrize(
     ("bad", "sentence"),
     [
-        (np.zeros(COUNT), r"Actions have shape \(6, 1\), not \(6,\)"),
-        (np.zeros((COUNT, 2)), r"Actions have shape"),
-        (np.zeros((COUNT - 1, 1)), r"Actions have shape"),
+        (np.zeros(COUNT), r"of shape \(6, 1\), not of float64 of shape \(6,\)"),
+        (np.zeros((COUNT, 2)), "An action must be an array of numbers of shape"),
+        (np.zeros((COUNT - 1, 1)), "An action must be an array of numbers of shape"),
         (np.where(np.arange(COUNT) == 4, np.nan, 0.0)[:, None], "Environment 4: An action must be"),
         (np.full((COUNT, 1), np.inf), "Environment 0: An action must be a finite acceleration"),
     ],
