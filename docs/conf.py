@@ -40,8 +40,10 @@ myst_heading_anchors = 3
 # MathJax would be fetched from afar; MathML is drawn by the browser itself.
 html_math_renderer = "mathml"
 
-autodoc_default_options = {"members": True, "member-order": "bysource", "show-inheritance": False}
+autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints_format = "short"
+add_module_names = False
+toc_object_entries_show_parents = "hide"
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
 napoleon_numpy_docstring = False
@@ -56,5 +58,6 @@ sphinx_gallery_conf = {
     "show_memory": False,
     "write_computation_times": False,
     "show_signature": False,
+    "min_reported_time": 3600,
     "abort_on_example_error": True,
 }

@@ -20,6 +20,9 @@ from latex2mathml.converter import convert
 SECTION = re.compile(r"^(Args|Attributes|Raises|Returns|Yields|Warns|Note|Example):$")
 """Google's sections, which napoleon reads: their indentation is no block of equations."""
 
+ARRAY = re.compile(r"[~\w.]*ndarray\[tuple\[[~\w.]*Any, \.\.\.\], [~\w.]*dtype\[([~\w.]+)\]\]")
+"""How an array's type prints; it is written NDArray in the source."""
+
 INDEX = """Rooms, file by file
 ===================
 
@@ -138,13 +141,18 @@ def _inline(text: str, names: dict[str, str]) -> str:
 
 
 def _display_math(self: Any, node: nodes.Element) -> None:
-    self.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
+    self.body.append(f'<div class="math">{_mathml(node, display="block")}</div>')
     raise nodes.SkipNode
 
 
 def _inline_math(self: Any, node: nodes.Element) -> None:
-    self.body.append(convert(node.astext()))
+    self.body.append(_mathml(node, display="inline"))
     raise nodes.SkipNode
+
+
+def _mathml(node: nodes.Element, display: str) -> str:
+    # TeX sets functions off by itself, the converter does not.
+    return convert(re.sub(r"\\(sin|cos)\b", r"\\,\\\1\\,", node.astext()), display=display)
 
 
 def setup(app: Any) -> dict[str, bool]:
@@ -154,6 +162,10 @@ def setup(app: Any) -> dict[str, bool]:
     def process(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
         lines[:] = restructured(lines, names)
 
+    def sign(app: Any, what: str, name: str, thing: Any, options: Any, *signature: Any) -> Any:
+        return tuple(part and re.sub(ARRAY, r"NDArray[\1]", part) for part in signature)
+
     app.connect("autodoc-process-docstring", process, priority=400)  # before napoleon, at 500
+    app.connect("autodoc-process-signature", sign)
     app.add_html_math_renderer("mathml", (_inline_math, None), (_display_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -30,15 +30,13 @@ trajectories = {
 
 for name, trajectory in trajectories.items():
     m = trajectory.metrics()
-    print(
-        f"{name:9s} IAE {m.IAE:6.2f} m, largest sway {np.degrees(m.max_sway):5.2f} degrees, "
-        f"drift after release {m.release_drift:.2f} m"
-    )
+    sway = np.degrees(m.max_sway)
+    print(f"{name:9s} IAE {m.IAE:5.2f} m, largest sway {sway:5.2f} degrees")
 
 # %%
 # Without help the payload swings about the reference, and goes on swinging after the release.
 
-figure, (velocity, sway) = plt.subplots(2, sharex=True, figsize=(8, 5), layout="constrained")
+figure, (velocity, sway) = plt.subplots(2, sharex=True, layout="constrained")
 for name, trajectory in trajectories.items():
     velocity.plot(trajectory.time, trajectory.payload_velocity, label=name)
     sway.plot(trajectory.time, np.degrees(trajectory.sway_angle))

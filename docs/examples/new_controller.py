@@ -2,7 +2,7 @@
 A new controller, compared
 ==========================
 
-A controller is anything with ``reset`` and ``act``. This one is a state feedback in one line; it is
+A controller is anything with ``reset`` and ``act``. This one is a state feedback; it is
 compared with the crane without help and with the adaptive MPC, on the ten manoeuvres of Table I and
 on ten random operators.
 """
@@ -17,7 +17,7 @@ from baselines import make_controller
 # %%
 # With small sway and a constant cable length the trolley's acceleration u moves three states:
 #
-# .. math:: v' = u, \qquad \theta' = q, \qquad l q' = -g \theta - u.
+# .. math:: \dot v = u, \qquad \dot\theta = q, \qquad l\,\dot q = -g \theta - u.
 #
 # The feedback :math:`u = k_1 (w - v) + k_2 \theta + k_3 q` gives the characteristic polynomial
 #
@@ -41,7 +41,8 @@ class SwayFeedback:
         o = crane_env.Observation.of(observation)
         g, l, limit = self.crane.gravity, o.cable_length, self.crane.acceleration_max
         omega = np.sqrt(g / l)
-        u = omega * (o.travel_reference - o.trolley_velocity + l * o.sway_rate) + g * o.sway_angle
+        velocity_error = o.travel_reference - o.trolley_velocity
+        u = omega * (velocity_error + l * o.sway_rate) + g * o.sway_angle
         return np.array([np.clip(u, -limit, limit)])
 
 
