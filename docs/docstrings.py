@@ -23,6 +23,12 @@ SECTION = re.compile(r"^(Args|Attributes|Raises|Returns|Yields|Warns|Note|Exampl
 ARRAY = re.compile(r"[~\w.]*ndarray\[tuple\[[~\w.]*Any, \.\.\.\], [~\w.]*dtype\[([~\w.]+)\]\]")
 """How an array's type prints; it is written NDArray in the source."""
 
+STRAY = re.compile(r"((?<!\w)\*\w[\w ]*\*(?!\w))|([\\*|])")
+"""Emphasis, or a star, bar or backslash that is meant as such in plain text."""
+
+COLON = "\ue000"
+"""Stands for a colon while napoleon looks, which takes a first sentence with one for a type."""
+
 INDEX = """Rooms, file by file
 ===================
 
@@ -135,7 +141,7 @@ def _inline(text: str, names: dict[str, str]) -> str:
             # Markup ends at a word's end only: "`Plan`s" needs a gap of no width.
             parts[number] = role + ("\\ " if parts[number + 1][:1].isalnum() else "")
         else:
-            parts[number] = re.sub(r"([\\*|])", r"\\\1", part)
+            parts[number] = STRAY.sub(lambda m: m[1] or "\\" + m[2], part)
             parts[number] = re.sub(r"(?<=\w)_(?!\w)", r"\\_", parts[number])
     return "".join(parts)
 
@@ -161,11 +167,22 @@ def setup(app: Any) -> dict[str, bool]:
 
     def process(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
         lines[:] = restructured(lines, names)
+        if what in ("attribute", "data", "property"):
+            lines[:] = [line.replace(":", COLON) for line in lines]
+
+    def restore(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+        lines[:] = [line.replace(COLON, ":") for line in lines]
+
+    def skip(app: Any, what: str, name: str, thing: Any, *_: Any) -> bool | None:
+        # The fields of a NamedTuple; its signature has them, with their types.
+        return True if (thing.__doc__ or "").startswith("Alias for field number") else None
 
     def sign(app: Any, what: str, name: str, thing: Any, options: Any, *signature: Any) -> Any:
         return tuple(part and re.sub(ARRAY, r"NDArray[\1]", part) for part in signature)
 
     app.connect("autodoc-process-docstring", process, priority=400)  # before napoleon, at 500
+    app.connect("autodoc-process-docstring", restore, priority=600)
     app.connect("autodoc-process-signature", sign)
+    app.connect("autodoc-skip-member", skip)
     app.add_html_math_renderer("mathml", (_inline_math, None), (_display_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -42,17 +42,18 @@ for name, trajectory in trajectories.items():
     sway.plot(trajectory.time, np.degrees(trajectory.sway_angle))
 velocity.plot(trajectory.time, trajectory.travel_reference, "k--", label="reference")
 velocity.set_ylabel("payload velocity [m/s]")
-velocity.legend(ncols=3, loc="upper right")
+figure.legend(loc="outside upper center", ncols=3)
 sway.set_ylabel("sway angle [degrees]")
 sway.set_xlabel("time [s]")
 figure.show()
 
 # %%
-# A film takes three lines: an environment that draws and a wrapper of Gymnasium's that keeps its
+# A film takes three lines beside an environment that draws: a wrapper of Gymnasium's that keeps the
 # pictures, an episode, and a file. Every fifth picture of 50 a second makes 10 a second; the ending
 # ``.gif`` makes a GIF. (``pip install 'oilcrane[film]'``; the pictures need no screen.)
 
-picture = {"render_mode": "rgb_array", "render_width": 640, "render_height": 528}
-film = gym.wrappers.RenderCollection(gym.make("OILCrane-v0", operator="table1:1", **picture))
+view = {"render_mode": "rgb_array", "render_width": 640, "render_height": 528}
+env = gym.make("OILCrane-v0", operator="table1:1", **view)
+film = gym.wrappers.RenderCollection(env)
 crane_env.run_episode(film, make_controller("adaptive"), seed=0, max_steps=500)
 imageio.mimsave("first_drive.mp4", film.render()[::5], fps=10)
