@@ -80,7 +80,8 @@ class TrolleyLimits:
             trolley_velocity: measured [m/s]; may lie beyond the limits.
         """
         if math.isnan(acceleration):
-            acceleration = -trolley_velocity / self._period
+            velocity = 0.0 if math.isnan(trolley_velocity) else trolley_velocity
+            acceleration = -velocity / self._period
         lowest, highest = self.acceleration_range
         slowest, fastest = self.velocity_range
         low = max(lowest, min((slowest - trolley_velocity) / self._period, highest))

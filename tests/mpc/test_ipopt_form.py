@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import Bounds, LinearConstraint, minimize
 
 from baselines.mpc import ipopt_form
-from baselines.mpc.ipopt_form import nmpc_a_ipopt, nmpc_b_ipopt
+from baselines.mpc.ipopt_form import nmpc_b_ipopt
 from baselines.mpc.limits import TrolleyLimits
 from baselines.mpc.prediction.cable import measured_cable_rate
 from baselines.mpc.prediction.problem import Horizon, Start
@@ -47,17 +47,6 @@ def test_the_plan_minimises_equation_6_as_scipy_integrates_and_minimises_it() ->
     plan = nmpc_b_ipopt(CRANE, settings)._plan(observation, np.zeros(3))
     assert plan.moves == pytest.approx(best.x, abs=1e-3)
     assert cost(plan.moves) == pytest.approx(best.fun, rel=1e-7)  # type: ignore[arg-type]
-
-
-def test_assumption_a_ignores_the_cables_rate() -> None:
-    resting = np.array([0.0, 0.5, 4.0, 0.0, 0.1, -0.1, 1.0, 0.0])
-    hoisting = resting.copy()
-    hoisting[3] = -1.0
-    still = nmpc_a_ipopt(CRANE, MpcSettings())
-    assert still.act(hoisting) == pytest.approx(
-        nmpc_a_ipopt(CRANE, MpcSettings()).act(resting), abs=1e-12
-    )
-    assert abs(nmpc_b_ipopt(CRANE, MpcSettings()).act(hoisting) - still.act(hoisting)) > 0.01
 
 
 def test_iterations_that_run_out_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,12 +27,6 @@ def limits_of(
     return TrolleyLimits(CRANE, problem)
 
 
-def test_limits_left_open_are_the_cranes() -> None:
-    limits = TrolleyLimits(CRANE, MpcSettings())
-    assert limits.acceleration_range == (-5.0, 5.0)
-    assert limits.velocity_range == (-2.0, 2.0)
-
-
 @given(velocity=st.floats(-0.8, 1.2))
 def test_inside_the_limits_the_bounds_are_those_of_eq_6(velocity: float) -> None:
     lower, upper = limits_of((-3.0, 2.0), (-0.8, 1.2)).bounds(velocity)

@@ -197,29 +197,6 @@ READINGS = [
 ]
 
 
-@pytest.mark.parametrize("reading", READINGS)
-def test_on_a_cable_at_rest_ltv_acts_as_the_adaptive_mpc(reading: MpcSettings) -> None:
-    varying, constant = ltv(CRANE, reading), adaptive(CRANE, reading)
-    rng = np.random.default_rng(1)
-    for _ in range(50):
-        start = random_observation(rng)._replace(cable_rate=0.0)
-        assert act(varying, start) == pytest.approx(act(constant, start), abs=1e-9)
-
-
-def test_a_hoist_that_pulls_at_its_limit_is_one_at_rest() -> None:
-    varying, constant = ltv(CRANE, MpcSettings()), adaptive(CRANE, MpcSettings())
-    rng = np.random.default_rng(2)
-    for length, rate in ((1.0, -1.0), (0.7, -0.4), (12.0, 0.9), (12.03, 1.0)):
-        start = random_observation(rng)._replace(cable_length=length, cable_rate=rate)
-        assert act(varying, start) == pytest.approx(act(constant, start), abs=1e-9)
-
-
-def test_while_the_hoist_runs_ltv_acts_otherwise() -> None:
-    varying, constant = ltv(CRANE, MpcSettings()), adaptive(CRANE, MpcSettings())
-    start = Observation(0.0, 0.5, 5.0, -1.0, 0.05, 0.1, 1.0, -1.0)
-    assert abs(act(varying, start) - act(constant, start)) > 0.05
-
-
 @given(length=st.floats(0.0, 13.0), rate=st.floats(-2.0, 2.0), reading=st.sampled_from(READINGS))
 @settings(max_examples=60, deadline=None)
 def test_the_time_varying_hessian_is_symmetric_and_at_least_lambda_u(

@@ -31,6 +31,7 @@ from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
+from tests.mpc.prediction.linear_crane import random_observation
 
 Factory = Callable[[CraneParameters, MpcSettings], NonlinearMpc]
 
@@ -38,26 +39,6 @@ CRANE = CraneParameters()
 PAPER = MpcSettings()
 PROBLEM = GaussNewton(CRANE, PAPER)
 MOVES = PAPER.control_horizon
-
-
-def random_observation(rng: np.random.Generator) -> Observation:
-    """A state of the acceptance's range: sway to 0.3 rad, l from 2 to 10 m, hoisting both ways."""
-    length = rng.uniform(2.0, 10.0)
-    swing = rng.uniform(-0.3, 0.3, 2)
-    return Observation(
-        trolley_position=0.0,
-        trolley_velocity=rng.uniform(-2.0, 2.0),
-        cable_length=length,
-        cable_rate=rng.choice([-1.0, 1.0]) * rng.uniform(0.0, 1.0),
-        sway_angle=swing[0],
-        sway_rate=swing[1] * np.sqrt(CRANE.gravity / length),
-        travel_reference=rng.choice([-1.0, 0.0, 1.0]),
-        hoist_reference=0.0,
-    )
-
-
-def as_array(observation: Observation) -> NDArray[np.float64]:
-    return np.array(observation)
 
 
 def fast_plan(observation: Observation, moves: NDArray[np.float64]) -> Plan:
@@ -161,7 +142,7 @@ def test_every_reading_of_equation_6_has_ipopts_optimum(sway_term: str, tail: st
     fast, slow = nmpc_b(CRANE, reading), nmpc_b_ipopt(CRANE, reading)
     rng = np.random.default_rng(5)
     for _ in range(10):
-        observation = as_array(random_observation(rng))
+        observation = np.array(random_observation(rng))
         fast.reset()
         slow.reset()
         assert fast.act(observation) == pytest.approx(slow.act(observation), abs=1e-5)
@@ -286,7 +267,7 @@ def test_a_plan_that_ran_out_of_iterations_acts_and_is_counted(
     assert plan.moves is not None
     assert PROBLEM.linearise(start, plan.moves).cost < before
     controller = nmpc_b(CRANE, PAPER)
-    assert controller.act(as_array(observation)) == pytest.approx([plan.moves[0]])
+    assert controller.act(np.array(observation)) == pytest.approx([plan.moves[0]])
     statistics = controller.statistics
     assert (statistics.solves, statistics.iterations, statistics.unconverged) == (1, 2, 1)
     assert statistics.failures == 0
@@ -300,25 +281,3 @@ def test_a_later_step_that_fails_leaves_the_best_plan(monkeypatch: pytest.Monkey
     plan = fast_plan(observation, np.zeros(MOVES))
     assert plan.moves is not None
     assert (plan.iterations, plan.converged) == (2, False)
-
-
-@pytest.mark.parametrize("build", [nmpc_b, nmpc_b_rti])
-def test_a_solver_that_fails_100_times_leaves_the_crane_at_rest_and_says_so(
-    build: Factory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    controller = build(CRANE, PAPER)
-    velocity = 1.5
-    controller.act(np.array([0.0, velocity, 5.0, 0.0, 0.0, 0.0, 1.0, 0.0]))
-
-    def fail(*_: object) -> QpSolution:
-        return QpSolution(None, np.zeros(2 * MOVES), 1, -1)
-
-    monkeypatch.setattr(QuadraticProgram, "solve", fail)
-    for _ in range(100):
-        action = controller.act(np.array([0.0, velocity, 5.0, 0.0, 0.0, 0.0, 1.0, 0.0]))
-        assert abs(action[0]) <= CRANE.acceleration_max
-        velocity += CRANE.control_period * float(action[0])
-    assert velocity == pytest.approx(0.0, abs=1e-12)
-    statistics = controller.statistics
-    assert statistics.failures == statistics.longest_failure_run == 100
-    assert statistics.braking_steps == 100 - (MOVES - 1)

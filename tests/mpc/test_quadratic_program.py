@@ -44,16 +44,6 @@ def test_the_solution_satisfies_the_kkt_conditions(size: int, rows: int, seed: i
     np.testing.assert_allclose(reached[dual < 0.0], lower[dual < 0.0], atol=1e-8)
 
 
-def test_no_constraint_in_reach_leaves_the_newton_step() -> None:
-    rng = np.random.default_rng(0)
-    hessian, gradient = definite(rng, 4), rng.normal(size=4)
-    far = np.full(8, 1e6)
-    found = QuadraticProgram(TRIANGLE).solve(hessian, gradient, -far, far)
-    assert found.minimiser is not None
-    np.testing.assert_allclose(found.minimiser, -np.linalg.solve(hessian, gradient), atol=1e-10)
-    assert not found.multipliers.any()
-
-
 def test_a_strided_hessian_is_read_as_the_matrix_it_is() -> None:
     rng = np.random.default_rng(1)
     wide = np.zeros((4, 9))

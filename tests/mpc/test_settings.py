@@ -14,13 +14,6 @@ from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
 
 
-def test_the_defaults_are_the_papers() -> None:
-    problem = MpcSettings()
-    assert (problem.prediction_horizon, problem.control_horizon) == (100, 10)
-    assert problem.cost == StageCost()
-    assert problem.tail == "hold"
-
-
 @pytest.mark.parametrize(
     ("settings", "reason"),
     [

@@ -84,11 +84,6 @@ def test_interpolation_reproduces_polynomials_of_its_degree(
         assert weights @ points**power == pytest.approx(position**power, abs=1e-9)
 
 
-def test_the_nodes_of_a_cubic_surround_the_point() -> None:
-    assert INTERPOLATIONS["cubic"](5.3, 12)[0] == 4
-    assert INTERPOLATIONS["nearest"](5.6, 12)[0] == 6
-
-
 @pytest.mark.parametrize("term", ["displacement", "angle", "printed"])
 @pytest.mark.parametrize("tail", ["hold", "zero"])
 def test_at_its_nodes_a_table_has_the_cost_itself(tail: str, term: str) -> None:
@@ -306,9 +301,3 @@ def test_on_table_1_tables_follow_the_operator_as_well_as_predictions() -> None:
         for table, exact in pairs:
             looked_up, computed = (iae(c, f"table1:{manoeuvre}", 8.0) for c in (table, exact))
             assert looked_up == pytest.approx(computed, rel=1e-3)
-
-
-def test_hoisting_into_the_limit_a_table_follows_the_operator_as_well_as_a_prediction() -> None:
-    table, exact = tabulated_ltv(CRANE, PAPER), ltv(CRANE, PAPER)
-    looked_up, computed = (iae(controller, "table1:1", 2.5) for controller in (table, exact))
-    assert looked_up == pytest.approx(computed, rel=1e-3)

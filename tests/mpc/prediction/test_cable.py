@@ -12,20 +12,10 @@ from hypothesis import strategies as st
 from baselines.mpc.prediction.cable import (
     cable_intervals,
     hoist_stop_time,
-    measured_cable_rate,
-    null_cable_rate,
 )
-from crane_env.observation import Observation
 
 T = 0.02
 SHORTEST, LONGEST = 1.0, 12.0
-
-
-def test_assumption_a_sees_a_cable_at_rest_and_assumption_b_the_measured_rate() -> None:
-    # The hoist has only begun to follow its button: the measurement counts, not the reference.
-    hoisting = Observation(0.0, 0.0, 8.0, -0.3, 0.0, 0.0, 0.0, -1.0)
-    assert null_cable_rate(hoisting) == 0.0
-    assert measured_cable_rate(hoisting) == -0.3
 
 
 @pytest.mark.parametrize(
@@ -59,17 +49,3 @@ def test_the_intervals_follow_the_clamped_length_exactly(
     # Every interval but the cut one ends a control period.
     assert np.delete(ends, cut) == pytest.approx(T * np.arange(1, periods + 1), abs=1e-12)
     assert (durations >= 0.0).all()
-
-
-def test_a_stop_inside_a_period_cuts_it_there() -> None:
-    durations, rates, cut = cable_intervals(-1.0, 0.033, T, 3)
-    assert cut == 1
-    assert durations == pytest.approx([0.02, 0.013, 0.007, 0.02])
-    assert rates.tolist() == [-1.0, -1.0, 0.0, 0.0]
-
-
-def test_without_a_stop_the_last_interval_is_empty() -> None:
-    durations, rates, cut = cable_intervals(-1.0, 5.0, T, 3)
-    assert cut == 2
-    assert durations == pytest.approx([0.02, 0.02, 0.02, 0.0], abs=1e-15)
-    assert rates.tolist() == [-1.0] * 4

@@ -8,7 +8,6 @@ import casadi
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from baselines.mpc.prediction.cable import measured_cable_rate, null_cable_rate
 from baselines.mpc.prediction.problem import Horizon, Start
@@ -17,6 +16,7 @@ from baselines.mpc.settings import MpcSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
+from tests.mpc.prediction.linear_crane import inputs, observe, simulate
 from tests.mpc.prediction.pendulum_reference import integrate
 
 CRANE = CraneParameters()
@@ -75,23 +75,6 @@ def test_the_squared_residuals_sum_to_the_stage_costs(sway_term: str) -> None:
     assert residuals @ residuals == pytest.approx(total, rel=1e-9)
 
 
-def pendulum(
-    moves: NDArray[np.float64], start: Start, tail: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Payload velocity and sway of models (2) and (3), by the matrix exponential."""
-    g, l = CRANE.gravity, start.cable_length  # noqa: E741, as in the mathematics
-    A = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [0.0, -g / l, 0.0, -1.0 / l]])
-    step = expm(np.vstack([A, np.zeros((1, 4))]) * CRANE.control_period)
-    x = np.array([start.trolley_velocity, start.sway_angle, start.sway_rate, 0.0])
-    samples = []
-    for i in range(100):
-        x[3] = moves[i] if i < len(moves) else moves[-1] if tail == "hold" else 0.0
-        x = step @ x
-        samples.append((x[0] + l * x[2], x[1]))
-    velocity, angle = np.array(samples).T
-    return velocity, angle
-
-
 @pytest.mark.parametrize("tail", ["hold", "zero"])
 @pytest.mark.parametrize("length", [1.0, 4.0, 12.0])
 def test_at_small_sway_and_constant_length_it_is_the_linear_model(length: float, tail: str) -> None:
@@ -100,8 +83,10 @@ def test_at_small_sway_and_constant_length_it_is_the_linear_model(length: float,
     errors = []
     for scale in (1e-2, 1e-3):
         start = Start(0.3, 0.2 * scale, -0.3 * scale, length, 0.0, 1.0)
-        velocity, angle = pendulum(MOVES * scale, start, tail)
-        expected = np.concatenate([velocity - 1.0, angle])
+        measured = observe(0.3, 0.2 * scale, -0.3 * scale)
+        moves = inputs(MOVES * scale, settings)
+        velocity, angle, rate = simulate(measured, length, moves, CRANE).T
+        expected = np.concatenate([velocity + length * rate - 1.0, angle])
         errors.append(np.abs(residuals(MOVES * scale, start)[:200] - expected).max())
     assert errors[1] < 1e-7
     # What the linear model leaves out is cubic in the sway.

@@ -131,19 +131,6 @@ def test_on_a_cable_at_rest_it_is_the_adaptive_prediction(tail: str, term: str) 
         np.testing.assert_allclose(varying.residuals(start), expected, rtol=0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("tail", TAILS)
-@pytest.mark.parametrize("cable", CABLES.values(), ids=CABLES.keys())
-def test_its_responses_are_the_derivatives_of_the_nonlinear_prediction_at_rest(
-    cable: tuple[float, float], tail: str
-) -> None:
-    problem = MpcSettings(tail=tail)
-    horizon = Horizon.of(CRANE, problem)
-    at_rest = Start.of(observe(cable, 0.0), measured_cable_rate, horizon)
-    _, jacobian = compiled_residuals_and_jacobian()(np.zeros(10), *horizon, *at_rest)
-    residuals = TimeVaryingPrediction(CRANE, problem).residuals(observe(cable))
-    np.testing.assert_allclose(residuals[:10], jacobian[:200].T, rtol=0.0, atol=1e-9)
-
-
 @pytest.mark.parametrize("term", TERMS)
 @pytest.mark.parametrize("cable", CABLES.values(), ids=CABLES.keys())
 def test_it_is_the_nonlinear_prediction_to_second_order_in_the_sway(
