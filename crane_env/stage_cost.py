@@ -15,7 +15,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
-from crane_env.kinematics import Scalars, sway_displacement
+from crane_env.kinematics import sway_displacement
+from crane_env.support.arithmetic import Scalars
 from crane_env.support.checks import choice, not_negative
 from crane_env.support.fields import from_fields
 

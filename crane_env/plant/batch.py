@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from crane_env.observation import CraneState, is_sound, largest_state
 from crane_env.parameters import CraneParameters
-from crane_env.plant.drives import ARRAYS, Drives, Stroke
+from crane_env.plant.drives import Drives, Stroke
 from crane_env.plant.outcome import Outcome
 from crane_env.plant.single import (
     DRIVE_ERROR,
@@ -76,7 +76,7 @@ class VectorPlant:
         self._drum_stroke = Stroke(
             np.full(len(cranes), stroke.centre), np.full(len(cranes), stroke.half)
         )
-        self._drives = Drives(cranes[0], self._drum_stroke, ARRAYS)
+        self._drives = Drives(cranes[0], self._drum_stroke)
         self._substeps = cranes[0].substeps
         self._largest: Any = CraneState._make(
             np.full(len(cranes), bound) for bound in largest_state(cranes[0])

@@ -20,31 +20,15 @@ crane and on arrays for many, bit for bit the same.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from crane_env.parameters import CraneParameters
+from crane_env.support.arithmetic import larger, root, sign, smaller
 
 RATE_ROUNDING = 1e-12
 """Differences of rates below this are rounding, not a limit [m/s]."""
-
-
-class Arithmetic(NamedTuple):
-    """The operations that differ between floats and arrays."""
-
-    minimum: Any
-    maximum: Any
-    sqrt: Any
-    copysign: Any
-    where: Any
-
-
-FLOATS = Arithmetic(
-    min, max, math.sqrt, math.copysign, lambda condition, yes, no: yes if condition else no
-)
-ARRAYS = Arithmetic(np.minimum, np.maximum, np.sqrt, np.copysign, np.where)
 
 
 class Stroke(NamedTuple):
@@ -59,9 +43,7 @@ class Stroke(NamedTuple):
         return cls(0.5 * (low + high), 0.5 * (high - low))
 
 
-def stoppable_rate(
-    rate: Any, gap: Any, acceleration: float, period: float, arithmetic: Arithmetic = FLOATS
-) -> Any:
+def stoppable_rate(rate: Any, gap: Any, acceleration: float, period: float) -> Any:
     """Highest rate one period from now from which the drive still stops within the gap.
 
     Args:
@@ -69,14 +51,13 @@ def stoppable_rate(
         gap: distance to the end of travel [m].
         acceleration: braking capability [m/s^2].
         period: control period [s].
-        arithmetic: `FLOATS` or `ARRAYS`.
 
     Returns:
         The rate [m/s], at least 0.
     """
     half = 0.5 * acceleration * period
     room = half * half + 2.0 * acceleration * (gap - 0.5 * rate * period)
-    return arithmetic.maximum(arithmetic.sqrt(arithmetic.maximum(room, 0.0)) - half, 0.0)
+    return larger(root(larger(room, 0.0)) - half, 0.0)
 
 
 def next_rate(
@@ -87,7 +68,6 @@ def next_rate(
     stroke: Stroke,
     acceleration: float,
     period: float,
-    arithmetic: Arithmetic = FLOATS,
 ) -> Any:
     """Setpoint rate one period from now: as wanted, within the ramp and the limit switches.
 
@@ -98,18 +78,16 @@ def next_rate(
         stroke: positions that the limit switches allow.
         acceleration: steepest ramp [m/s^2].
         period: control period [s].
-        arithmetic: `FLOATS` or `ARRAYS`.
 
     Returns:
         The rate [m/s]. The ramp outranks the switches: a drive cannot brake harder than it can.
     """
-    minimum, maximum, _, copysign, _ = arithmetic
-    direction = copysign(1.0, wanted)
+    direction = sign(wanted)
     gap = stroke.half - direction * (position - stroke.centre)
-    highest = stoppable_rate(direction * rate, gap, acceleration, period, arithmetic)
-    allowed = direction * minimum(abs(wanted), highest)
+    highest = stoppable_rate(direction * rate, gap, acceleration, period)
+    allowed = direction * smaller(abs(wanted), highest)
     step = acceleration * period
-    return minimum(maximum(allowed, rate - step), rate + step)
+    return smaller(larger(allowed, rate - step), rate + step)
 
 
 class DriveReport(NamedTuple):
@@ -144,12 +122,10 @@ class Drives:
     Args:
         parameters: limits, ramps and control period.
         drum_stroke: unstretched lengths that the hoist's limit switches allow, floats or arrays.
-        arithmetic: `FLOATS` or `ARRAYS`.
     """
 
     __slots__ = (
         "_acceleration_max",
-        "_arithmetic",
         "_drum_stroke",
         "_hoist_acceleration",
         "_hoist_steps",
@@ -159,9 +135,7 @@ class Drives:
         "_unlimited",
     )
 
-    def __init__(
-        self, parameters: CraneParameters, drum_stroke: Stroke, arithmetic: Arithmetic = FLOATS
-    ) -> None:
+    def __init__(self, parameters: CraneParameters, drum_stroke: Stroke) -> None:
         self._period = parameters.control_period
         self._speed_max = parameters.trolley_speed_max
         self._acceleration_max = parameters.acceleration_max
@@ -176,7 +150,6 @@ class Drives:
         self._hoist_acceleration = min(
             parameters.hoist_acceleration, 2.0 * parameters.hoist_speed / parameters.control_period
         )
-        self._arithmetic = arithmetic
 
     def travel(self, position: Any, rate: Any, acceleration: Any) -> DriveReport:
         """Drives the trolley.
@@ -186,25 +159,26 @@ class Drives:
             rate: of the setpoint [m/s].
             acceleration: asked for, within its limit [m/s^2].
         """
-        minimum, maximum, _, _, where = self._arithmetic
         wanted = rate + acceleration * self._period
         if (
-            self._arithmetic is FLOATS
+            isinstance(wanted, float)
             and abs(wanted) <= self._speed_max
             and abs(position) < self._unlimited
         ):
             return DriveReport(acceleration, False)  # as in most periods; see `hoist`
         reached = next_rate(
             rate,
-            minimum(maximum(wanted, -self._speed_max), self._speed_max),
+            smaller(larger(wanted, -self._speed_max), self._speed_max),
             position=position,
             stroke=self._rail_stroke,
             acceleration=self._acceleration_max,
             period=self._period,
-            arithmetic=self._arithmetic,
         )
         limited = abs(reached - wanted) > RATE_ROUNDING
-        return DriveReport(where(limited, (reached - rate) / self._period, acceleration), limited)
+        overruled = (reached - rate) / self._period
+        if isinstance(wanted, float):
+            return DriveReport(overruled if limited else acceleration, limited)
+        return DriveReport(np.where(limited, overruled, acceleration), limited)
 
     def hoist(self, length: Any, rate: Any, reference: Any) -> HoistReport:
         """Winds the cable.
@@ -214,7 +188,7 @@ class Drives:
             rate: of the unstretched length [m/s].
             reference: cable rate that the hoist ramps to, > 0 lengthens [m/s].
         """
-        if self._arithmetic is FLOATS and reference == 0.0 and abs(rate) < RATE_ROUNDING:
+        if isinstance(rate, float) and reference == 0.0 and abs(rate) < RATE_ROUNDING:
             reached = 0.0  # as in most periods; what `next_rate` says too, but not as quickly
         else:
             reached = next_rate(
@@ -224,7 +198,6 @@ class Drives:
                 stroke=self._drum_stroke,
                 acceleration=self._hoist_acceleration,
                 period=self._period,
-                arithmetic=self._arithmetic,
             )
         if self._hoist_steps:
             rate = reached

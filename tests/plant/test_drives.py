@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crane_env.parameters import CraneParameters
-from crane_env.plant.drives import ARRAYS, Drives, Stroke, next_rate, stoppable_rate
+from crane_env.plant.drives import Drives, Stroke, next_rate, stoppable_rate
 
 PAPER = CraneParameters.paper()
 STROKE = Stroke.between(1.0, 12.0)
@@ -31,7 +31,7 @@ def drives(ramp: float, *, many: bool) -> Drives:
     if not many:
         return Drives(parameters, STROKE)
     halves = Stroke(np.full(2, STROKE.centre), np.full(2, STROKE.half))
-    return Drives(parameters, halves, ARRAYS)
+    return Drives(parameters, halves)
 
 
 @given(positions, rates, accelerations, lengths, rates, rates, ramps)
