@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from baselines.mpc.linear import CostModel, QuadraticCost
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
+from crane_env.support.checks import choice, whole
 
 NODES_MIN = 4
 """Fewest nodes per axis: as many as a cubic goes through."""
@@ -83,8 +84,7 @@ class Axis:
 
     def __post_init__(self) -> None:
         """Refuses an axis that nothing can be interpolated on."""
-        if self.nodes < NODES_MIN:
-            raise ValueError(f"A table needs {NODES_MIN} nodes or more per axis, not {self.nodes}.")
+        whole("The nodes of an axis", self.nodes, NODES_MIN)
         if not self.low < self.high:
             raise ValueError(f"An axis must run upwards, not from {self.low} to {self.high}.")
 
@@ -119,10 +119,7 @@ class CostTable:
         move_cost: NDArray[np.float64],
         interpolation: str,
     ) -> None:
-        if interpolation not in INTERPOLATIONS:
-            valid = ", ".join(INTERPOLATIONS)
-            raise ValueError(f"Unknown interpolation {interpolation!r}; valid: {valid}.")
-        self._interpolate = INTERPOLATIONS[interpolation]
+        self._interpolate = INTERPOLATIONS[choice("interpolation", interpolation, INTERPOLATIONS)]
         self._axes = axes
         self._move_cost = move_cost
         moves = len(move_cost)

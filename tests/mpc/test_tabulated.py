@@ -245,7 +245,7 @@ def test_other_cranes_and_horizons_have_tables_of_their_own(
 
 
 def test_tables_that_cannot_be_are_refused() -> None:
-    with pytest.raises(ValueError, match="needs 4 nodes or more per axis, not 3"):
+    with pytest.raises(ValueError, match="nodes of an axis must be a whole number of at least 4"):
         AdaptiveTable(CRANE, PAPER, LengthGrid(lengths=3))
     with pytest.raises(ValueError, match="Unknown interpolation 'quintic'; valid: nearest, linear"):
         AdaptiveTable(CRANE, PAPER, LengthGrid(interpolation="quintic"))

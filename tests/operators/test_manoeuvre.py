@@ -17,7 +17,7 @@ from crane_env.operators.base import RELEASED
 from crane_env.operators.manoeuvre import RandomManoeuvre
 from crane_env.operators.table1 import TABLE_1, ManoeuvreTimes
 from crane_env.parameters import PRESETS, CraneParameters
-from tests.mpc.nominal_crane import at_rest, drawn, nominal_motion
+from tests.operators.nominal_crane import at_rest, drawn, nominal_motion
 
 PAPER = CraneParameters.paper()
 TABLE: Any = ManoeuvreTimes(*np.array(TABLE_1).T)

@@ -25,7 +25,7 @@ from crane_env.operators.script import ButtonScript, write_script
 from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
 from crane_env.operators.table1 import Table1Manoeuvre
 from crane_env.parameters import CraneParameters
-from tests.mpc.nominal_crane import at_rest
+from tests.operators.nominal_crane import at_rest
 
 PAPER = CraneParameters.paper()
 PRESSED = Buttons(forward=True)

@@ -17,7 +17,7 @@ import crane_env.operators.script
 from crane_env.operators.base import RELEASED, ButtonEvent, Buttons, ScheduledOperator
 from crane_env.operators.script import ButtonScript, read_script, write_script
 from crane_env.parameters import CraneParameters
-from tests.mpc.nominal_crane import at_rest, drawn
+from tests.operators.nominal_crane import at_rest, drawn
 
 PAPER = CraneParameters.paper()
 

@@ -17,7 +17,7 @@ from scipy import stats
 from crane_env.operators.base import RELEASED, ButtonEvent, ScheduledOperator
 from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
 from crane_env.parameters import PRESETS, CraneParameters
-from tests.mpc.nominal_crane import at_rest, drawn, nominal_motion
+from tests.operators.nominal_crane import at_rest, drawn, nominal_motion
 
 PAPER = CraneParameters.paper()
 ENDLESS = CraneParameters(

@@ -7,7 +7,7 @@ import pytest
 from crane_env.operators.base import RELEASED, ButtonEvent, Buttons
 from crane_env.operators.table1 import TABLE_1, Table1Manoeuvre
 from crane_env.parameters import CraneParameters
-from tests.mpc.nominal_crane import at_rest, drawn
+from tests.operators.nominal_crane import at_rest, drawn
 
 PRINTED = """
 1.83 2.20 1.50 1.92 4.37 1.77 1.90 1.68 1.91 2.74
