@@ -149,7 +149,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         self._parameters = CraneParameters.of(parameters)
         self._cost = StageCost.of(cost)
         self._plant = Plant(self._parameters)
-        frames = round(1.0 / self._parameters.control_period)
+        frames = max(1, round(1.0 / self._parameters.control_period))
         self.metadata = {**self.metadata, "render_fps": frames}
         limit = self._parameters.acceleration_max
         self.action_space = Box(-limit, limit, (1,), dtype=np.float32)

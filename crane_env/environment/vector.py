@@ -157,7 +157,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._default_operators = make_operators(operator, self.num_envs)
         self._operator = VectorOperator(self.num_envs)
 
-        frames = round(1.0 / self._parameters.control_period)
+        frames = max(1, round(1.0 / self._parameters.control_period))
         self.metadata = {
             **self.metadata,
             "render_fps": frames,
