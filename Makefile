@@ -29,7 +29,7 @@ benchmark: $(VENV)/run.stamp  ## Measures speed, as ratios taken in one run.
 	$(RUN) scripts/benchmark.py $(ARGS)
 
 docs: $(VENV)/dev.stamp  ## Builds the documentation with its examples, in docs/build.
-	$(RUN) -m sphinx --fail-on-warning --keep-going --quiet docs docs/build
+	$(RUN) -m sphinx --fail-on-warning --keep-going --quiet --jobs auto docs docs/build
 
 clean:  ## Removes the virtual environment and caches, not the results.
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis build *.egg-info docs/api docs/build docs/gallery

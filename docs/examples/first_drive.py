@@ -30,8 +30,8 @@ trajectories = {
 
 for name, trajectory in trajectories.items():
     m = trajectory.metrics()
-    sway = np.degrees(m.max_sway)
-    print(f"{name:9s} IAE {m.IAE:5.2f} m, largest sway {sway:5.2f} degrees")
+    degrees = np.degrees(m.max_sway)
+    print(f"{name:9s} IAE {m.IAE:5.2f} m, largest sway {degrees:5.2f} degrees")
 
 # %%
 # Without help the payload swings about the reference, and goes on swinging after the release.
@@ -55,5 +55,5 @@ figure.show()
 view = {"render_mode": "rgb_array", "render_width": 640, "render_height": 528}
 env = gym.make("OILCrane-v0", operator="table1:1", **view)
 film = gym.wrappers.RenderCollection(env)
-crane_env.run_episode(film, make_controller("adaptive"), seed=0, max_steps=500)
+crane_env.run_episode(film, make_controller("adaptive"), seed=0, max_steps=400)
 imageio.mimsave("first_drive.mp4", film.render()[::5], fps=10)
