@@ -26,6 +26,8 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "docstrings",
 ]
+highlight_language = "none"  # equations in docstrings; code says what it is
+smartquotes = False  # theta' is a derivative
 exclude_patterns = ["build", "examples"]
 suppress_warnings = ["config.cache"]  # the gallery's films are a function, which is not cached
 
