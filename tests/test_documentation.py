@@ -90,6 +90,14 @@ def test_the_commands_of_a_page_exist(page: Path) -> None:
                 assert program == ".venv/bin/pre-commit", line
 
 
+def test_every_file_that_a_page_names_exists() -> None:
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
+        for name in re.findall(r"`(?:python )?(\w+/[\w/]*\.\w+)", page.read_text(encoding="utf-8")):
+            assert any((root / name).exists() for root in (ROOT, ROOT / "crane_env")), (
+                f"{page.name}: {name}"
+            )
+
+
 @pytest.mark.parametrize("parameters", ["paper", "field"])
 def test_the_example_controller_drives_better_than_no_help(folder: Path, parameters: str) -> None:
     run_page(ROOT / "docs" / "own_controller.md", folder)
