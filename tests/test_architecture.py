@@ -24,7 +24,7 @@ TOUCH_MUJOCO = {
     "crane_env/rendering/scene.py",
     "crane_env/rendering/canvas.py",
     "crane_env/rendering/instruments.py",
-    "scripts/benchmark.py",
+    "baselines/commands/benchmark.py",
 }
 """The plant, its vectorised twin, the picture of it, and what measures the bare simulation."""
 

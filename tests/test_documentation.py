@@ -15,6 +15,7 @@ import pytest
 
 import crane_env
 from baselines import make_controller
+from baselines.commands.oilcrane import COMMANDS
 
 ROOT = Path(__file__).parent.parent
 PAGES = [
@@ -86,6 +87,8 @@ def test_the_commands_of_a_page_exist(page: Path) -> None:
                 assert (ROOT / arguments[0]).is_file(), line
             elif program == "pip":
                 assert set(re.findall(r"\w+", arguments[1])) <= set(extras), line
+            elif program == "oilcrane":
+                assert arguments[0] in (*COMMANDS, "--help"), line
             else:
                 assert program == ".venv/bin/pre-commit", line
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
+
+from baselines.commands.oilcrane import COMMANDS
 
 ROOT = Path(__file__).parent.parent
 PACKED = ("crane_env", "baselines", "scripts", "pyproject", "README", "LICENSE")
@@ -82,3 +85,16 @@ def test_without_an_extra_a_controller_names_the_one_it_needs(python: Path, tmp_
         "except ImportError as error: print(error)"
     )
     assert "pip install 'oilcrane[mpc]'" in run(python, "-c", code, cwd=tmp_path)
+
+
+def test_without_an_extra_the_program_lists_its_commands_and_each_names_the_extra_it_needs(
+    python: Path, tmp_path: Path
+) -> None:
+    program = python.with_name("oilcrane")
+    shown = run(program, "--help", cwd=tmp_path)
+    for name, command in COMMANDS.items():
+        assert re.search(rf"^  {name} +\[{command.extras}\]", shown, re.MULTILINE)
+        done = subprocess.run([program, name], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 2, name
+        assert re.fullmatch(rf"oilcrane {name}: .* pip install 'oilcrane\[.*\]'.\n", done.stderr)
+    assert not list(tmp_path.iterdir())

@@ -13,6 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import crane_env
+from baselines.commands.table_memory import (
+    LENGTH_GRIDS,
+    LENGTH_RATE_GRIDS,
+    PAGE,
+    Measurement,
+    measure_length_grids,
+    measure_length_rate_grids,
+)
 from baselines.mpc.cost_table import (
     INTERPOLATIONS,
     NODES_MIN,
@@ -41,14 +49,6 @@ from baselines.mpc.tabulated import (
 from crane_env.controller import Controller
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
-from scripts.table_memory import (
-    LENGTH_GRIDS,
-    LENGTH_RATE_GRIDS,
-    PAGE,
-    Measurement,
-    measure_length_grids,
-    measure_length_rate_grids,
-)
 from tests.mpc.prediction.linear_crane import act, random_observation
 
 CRANE = CraneParameters()

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from baselines.commands.reproduce import main
 from baselines.paper.checks import EQUAL, SIMILAR
-from scripts.reproduce_paper import main
 
 VERDICTS = {
     "linear-oscillates": "not reproduced",

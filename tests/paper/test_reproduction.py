@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from baselines.commands.reproduce import main
 from baselines.evaluation.episode_spec import Setup
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.paper.checks import Finding
@@ -54,7 +55,6 @@ from baselines.paper.stages import (
 from baselines.paper.verdicts import Judgement
 from crane_env import make_operator
 from crane_env.operators.table1 import TABLE_1
-from scripts.reproduce_paper import main
 from tests.paper.paper_evidence import agreeing_evidence, scaled
 
 ROOT = Path(__file__).parents[2]
@@ -314,7 +314,9 @@ def test_a_failing_controller_ends_with_1_and_is_named(
 ) -> None:
     raising = "tests.evaluation.stub_controllers:raising"
     specs = tuple(table_specs(Setup(max_steps=110), (raising,))[:2])
-    monkeypatch.setattr("scripts.reproduce_paper.defaults_stage", lambda: Stage("defaults", specs))
+    monkeypatch.setattr(
+        "baselines.commands.reproduce.defaults_stage", lambda: Stage("defaults", specs)
+    )
     assert main(["--output", str(tmp_path), "--no-timing", "--grid", "none"]) == 1
     message = capsys.readouterr().err
     assert f"{raising}, table1:1, seed 0 failed: ArithmeticError: no plan for this" in message

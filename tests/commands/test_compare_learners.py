@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from baselines import make_controller
+from baselines.commands.compare_learners import MARKER, main
 from crane_env import run_episode
-from scripts.compare_rl import MARKER, main
 
 
 def test_the_report_keeps_its_text_and_has_the_indices_of_every_controller(tmp_path: Path) -> None:

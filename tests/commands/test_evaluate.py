@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from baselines.commands.evaluate import json_object, main, seed_range
 from baselines.evaluation.results import ResultsFolder
 from crane_env import Trajectory
-from scripts.evaluate import json_object, main, seed_range
 
 ROOT = Path(__file__).parents[2]
 STUBS = "tests.evaluation.stub_controllers"
@@ -207,7 +207,7 @@ def test_a_missing_extra_is_named(tmp_path: Path) -> None:
         shadow = tmp_path / module / "shadow"
         shadow.mkdir(parents=True)
         (shadow / f"{module}.py").write_text("raise ModuleNotFoundError", encoding="utf-8")
-        process = start("--output", str(tmp_path / "out"), env={"PYTHONPATH": str(shadow)})
+        process = start("--output", str(tmp_path / "out"), env={"PYTHONPATH": f"{shadow}:{ROOT}"})
         _, err = process.communicate(timeout=60)
         assert process.returncode == 2
         assert f"{module!r}" in err

@@ -1,0 +1,1 @@
+"""Commands: the programs of `oilcrane`, which are also those of `scripts/`."""
