@@ -6,7 +6,7 @@ RUN := $(VENV)/bin/python
 PIP := $(RUN) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help evaluate reproduce test check benchmark docs clean
+.PHONY: help evaluate reproduce test proofs check benchmark docs clean
 
 help:  ## Lists the commands.
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -17,8 +17,11 @@ evaluate: $(VENV)/run.stamp  ## Drives the ten manoeuvres of Table I; results in
 reproduce: $(VENV)/run.stamp  ## Puts the paper to the test; verdicts and report in results/paper.
 	$(RUN) scripts/reproduce_paper.py $(ARGS)
 
-test: $(VENV)/dev.stamp check  ## Runs the linters and all tests.
-	$(RUN) -m pytest $(ARGS)
+test: $(VENV)/dev.stamp check  ## Runs the linters and the tests, or some: ARGS=tests/plant.
+	$(RUN) -m pytest -n auto -m "not slow" $(ARGS)
+
+proofs: $(VENV)/dev.stamp  ## Runs the tests that take longer than a few seconds.
+	$(RUN) -m pytest -n auto -m slow $(ARGS)
 
 check: $(VENV)/dev.stamp  ## Runs the linters alone.
 	$(RUN) -m ruff check .
@@ -34,16 +37,17 @@ docs: $(VENV)/dev.stamp  ## Builds the documentation with its examples, in docs/
 clean:  ## Removes the virtual environment and caches, not the results.
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis build *.egg-info docs/api docs/build docs/gallery
 
-# A stamp appears only after its installation succeeded, so an interrupted one is repeated.
-$(VENV)/bin/python:
+# A stamp appears only after its installation succeeded, so an interrupted one is repeated; and venv
+# writes bin/activate last, so without it the environment is begun anew.
+$(VENV)/bin/activate:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "OILCrane needs Python 3.11 or newer; set PYTHON=/path/to/python3.11"; exit 1; }
-	$(PYTHON) -m venv $(VENV)
+	$(PYTHON) -m venv --clear $(VENV)
 
-$(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/python
+$(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/activate
 	$(PIP) --editable '.[mpc,results,policies]'
 	@touch $@
 
-$(VENV)/dev.stamp: pyproject.toml | $(VENV)/bin/python
+$(VENV)/dev.stamp: pyproject.toml | $(VENV)/bin/activate
 	$(PIP) --editable '.[mpc,results,rl,dev]'
 	@touch $@ $(VENV)/run.stamp
