@@ -1,4 +1,4 @@
-"""Every test: where the variable CI is set, a skipped one has failed, for nobody would notice it."""
+"""Every test: where the variable CI is set, a skipped one has failed, as nobody would notice."""
 
 from __future__ import annotations
 

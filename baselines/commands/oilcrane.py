@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
-from baselines.commands.terminal import ended, interruptible
+from baselines.commands.terminal import ended, interruptible, sentence
 from crane_env.support.checks import choice
 
 PROGRAM = "oilcrane"
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             print(overview(), file=sys.stdout if given else sys.stderr, flush=True)
         except OSError as error:
-            return ended(PROGRAM, 1, str(error))
+            return ended(PROGRAM, 1, sentence(error))
         return 0 if given else 2
     try:
         return run_command(choice("command", given[0], COMMANDS), given[1:])

@@ -69,6 +69,9 @@ def run(
     given = sys.argv[1:] if arguments is None else list(arguments)
     if str(Path.cwd()) not in sys.path:
         sys.path.append(str(Path.cwd()))  # code of one's own may lie in the working folder
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by who started the process
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal may not know every letter
@@ -87,7 +90,7 @@ def run(
         except (ValueError, ImportError) as error:
             return ended(program, 2, str(error))
         except OSError as error:
-            return ended(program, 1 if started else 2, str(error))
+            return ended(program, 1 if started else 2, sentence(error))
         except Exception as error:  # a fault of the program: the place where it is helps to mend it
             place = extract_tb(error.__traceback__)[-1]
             fault = f"{type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
@@ -104,6 +107,14 @@ def ended(program: str, code: int, *lines: str) -> int:
     except OSError:  # nobody reads it any more: Python must not try again at its exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return code
+
+
+def sentence(error: OSError) -> str:
+    """What the system refused, where the error does not say it in a sentence already."""
+    if error.strerror is None:
+        return str(error)
+    what = "The output" if error.filename is None else repr(error.filename)
+    return f"{what} cannot be read or written: {error.strerror}."
 
 
 @contextmanager

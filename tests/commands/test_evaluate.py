@@ -145,6 +145,32 @@ def test_failed_episodes_are_named_and_the_exit_code_is_1(
     assert len(ResultsFolder(tmp_path).read_metrics()) == 1
 
 
+@pytest.mark.parametrize(
+    ("redirection", "code"), [(">/dev/full", 1), (">&-", 0), ("| cat", 0)], ids=str
+)
+def test_results_are_written_first_wherever_the_tables_go_even_in_ascii(
+    redirection: str, code: int, tmp_path: Path
+) -> None:
+    arguments = (*QUICK, "--operators", "table1:1", "--no-figures", "--output", str(tmp_path))
+    shell = ("bash", "-o", "pipefail", "-c", f'"$@" {redirection}', "")
+    done = subprocess.run(
+        (*shell, sys.executable, "scripts/evaluate.py", *arguments),
+        cwd=ROOT,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        text=True,
+    )
+    said = [line for line in done.stderr.splitlines() if line.startswith("oilcrane evaluate: ")]
+    assert done.returncode == code, done.stderr
+    assert (
+        said
+        == ["oilcrane evaluate: The output cannot be read or written: No space left on device."]
+        * code
+    )
+    assert "Traceback" not in done.stderr
+    assert len(ResultsFolder(tmp_path).read_metrics()) == 1
+
+
 BAD_INPUT = {
     "controller": (("--controllers", "nobody"), "Unknown controller 'nobody'; valid: manual, lin"),
     "module": (("--controllers", "nowhere:nobody"), "'nowhere:nobody' cannot be imported"),
