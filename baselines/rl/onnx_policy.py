@@ -88,7 +88,7 @@ class OnnxPolicy:
         if found != FORMAT:
             raise ValueError(
                 f"{str(file)!r} is not a policy of format {FORMAT!r} (found {found!r}); "
-                "export it again with scripts/train_rl.py --export."
+                "export it again with oilcrane train --export."
             )
         for kind, nodes, name, width in (
             ("input", self._session.get_inputs(), INPUT, len(Observation._fields)),

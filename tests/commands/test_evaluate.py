@@ -83,13 +83,16 @@ def test_the_main_job_prints_tables_and_leaves_metrics_trajectories_figures_and_
     assert not list((output / "figures").iterdir())
 
 
-def test_ctrl_c_keeps_the_finished_episodes_and_the_same_command_goes_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("interruption", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_keeps_the_finished_episodes_and_the_same_command_goes_on(
+    interruption: signal.Signals, tmp_path: Path
+) -> None:
     arguments = (*SLOW, "--output", str(tmp_path))
     process = start(*arguments)
     wait_for_records(process, tmp_path, 3)
-    os.killpg(process.pid, signal.SIGINT)
+    os.killpg(process.pid, interruption)
     time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGINT)  # an impatient one
+    os.killpg(process.pid, interruption)  # an impatient one
     out, err = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "Traceback" not in err
