@@ -31,7 +31,7 @@ from rich.table import Table
 
 import crane_env
 from baselines import make_controller
-from baselines.commands.terminal import Job, run, table_console
+from baselines.commands.terminal import Job, check_writable, run, table_console
 from baselines.evaluation.worker_pool import available_cores
 from baselines.mpc.controller import PredictiveController
 from baselines.mpc.ipopt_form import WARM_BARRIER, IpoptNmpc
@@ -390,10 +390,13 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
 
     Raises:
         ValueError: an unknown section, or a number of rounds below 1.
+        OSError: a file that cannot be written.
     """
     for name in options.sections:
         choice("section", name, SECTIONS)
     whole("rounds", options.rounds, least=1)
+    if options.output is not None:
+        check_writable("output", options.output)
     return partial(measure, options)
 
 

@@ -21,7 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines import make_controller
-from baselines.commands.terminal import FailedError, Job, failure_lines, processes, progress, run
+from baselines.commands.terminal import (
+    FailedError,
+    Job,
+    check_writable,
+    failure_lines,
+    processes,
+    progress,
+    run,
+)
 from baselines.evaluation.comparison import check_controllers, compare
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.learning_figure import draw_learning
@@ -32,6 +40,7 @@ from crane_env import CraneParameters
 from crane_env.operators.registry import OperatorSpec
 from crane_env.operators.table1 import TABLE_1
 from crane_env.stage_cost import StageCost
+from crane_env.support.atomic_file import atomic_file
 
 PROGRAM = "oilcrane compare-learners"
 
@@ -100,7 +109,7 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     Raises:
         ValueError: an option that means nothing, or a value out of range.
         ImportError: a package is missing; the message names the extra that brings it.
-        OSError: a folder that cannot be written.
+        OSError: a folder or file that cannot be written.
     """
     if REFERENCE not in options.controllers:
         raise ValueError(f"controllers must include {REFERENCE!r}, the reference.")
@@ -109,6 +118,8 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     processes(options.jobs)
     check_controllers(episode_specs(options.controllers, ["manoeuvre"], [0], Setup()))
     ResultsFolder(options.output).prepare()
+    options.report.parent.mkdir(parents=True, exist_ok=True)
+    check_writable("report", options.report)
     return functools.partial(compare_learners, options, command)
 
 
@@ -135,9 +146,9 @@ def compare_learners(options: Options, command: Sequence[str]) -> None:
     before = ""
     if options.report.exists():
         before = options.report.read_text(encoding="utf-8").partition(MARKER)[0]
-    options.report.parent.mkdir(parents=True, exist_ok=True)
     text = "\n".join((before.rstrip(), "", MARKER, "", *sections))
-    options.report.write_text(text.lstrip() + "\n", encoding="utf-8")
+    with atomic_file(options.report) as partial:
+        partial.write_text(text.lstrip() + "\n", encoding="utf-8")
     print(f"Report: {options.report}.")
 
 

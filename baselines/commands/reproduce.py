@@ -8,7 +8,6 @@ It is done when there is a verdict on every claim, whatever it is.
 
 from __future__ import annotations
 
-import errno
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from pathlib import Path
 from baselines.commands.terminal import (
     FailedError,
     Job,
+    check_writable,
     failure_lines,
     processes,
     progress,
@@ -48,7 +48,7 @@ from baselines.paper.stages import (
     timing_stage,
     varied_evidence,
 )
-from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file
+from crane_env.support.atomic_file import atomic_file
 from crane_env.support.extras import require
 
 PROGRAM = "oilcrane reproduce"
@@ -106,26 +106,10 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     stages = [defaults_stage(), *([timing_stage()] if options.timing else [])]
     for stage in stages:
         stage_folder(stage, options.output).prepare()
-    check_writable(report_file(options))
+    check_writable("report", report_file(options))
     for stage in stages:
         check_controllers(stage.specs)
     return functools.partial(reproduce, options, jobs, command)
-
-
-def check_writable(file: Path) -> None:
-    """Tries whether a file could be written, and leaves it as it is.
-
-    Raises:
-        OSError: it could not; the message says which and why.
-    """
-    probe = file.with_name(f".{file.name}{PARTIAL_SUFFIX}")
-    try:
-        if file.is_dir():
-            raise IsADirectoryError(errno.EISDIR, "it is a folder")
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise OSError(f"The report {str(file)!r} cannot be written: {error.strerror}.") from error
 
 
 def reproduce(options: Options, jobs: int, command: Sequence[str]) -> None:

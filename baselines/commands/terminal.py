@@ -10,6 +10,7 @@ Whatever goes wrong is told in one line on standard error.
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -23,6 +24,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from baselines.evaluation.results import EpisodeResult
 from baselines.evaluation.worker_pool import available_cores
+from crane_env.support.atomic_file import PARTIAL_SUFFIX
 from crane_env.support.extras import require
 
 if TYPE_CHECKING:
@@ -152,6 +154,22 @@ def processes(jobs: int | None) -> int:
             f"jobs must be at most {MOST_JOBS * cores}, {MOST_JOBS} a core, not {jobs}."
         )
     return jobs
+
+
+def check_writable(what: str, file: Path) -> None:
+    """Tries whether a file could be written, and leaves it as it is.
+
+    Raises:
+        OSError: it could not; the message says which and why.
+    """
+    probe = file.with_name(f".{file.name}{PARTIAL_SUFFIX}")
+    try:
+        if file.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "it is a folder")
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise OSError(f"The {what} {str(file)!r} cannot be written: {error.strerror}.") from error
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import pytest
 
 from baselines import make_controller
 from baselines.commands.compare_learners import MARKER, main
+from baselines.commands.oilcrane import run_command
 from crane_env import run_episode
 
 
@@ -54,3 +55,11 @@ def test_a_comparison_without_its_reference_is_refused(
 ) -> None:
     assert main(["--controllers", "ppo", "--output", str(tmp_path)]) == 2
     assert "controllers must include 'adaptive'" in capsys.readouterr().err
+
+
+def test_what_cannot_be_written_is_refused_before_anything_is_measured(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--report", str(tmp_path), "--output", str(tmp_path / "episodes")]) == 2
+    assert run_command("benchmark", ["--output", str(tmp_path)]) == 2
+    assert capsys.readouterr().err.count(f"{str(tmp_path)!r} cannot be written: it is a f") == 2
