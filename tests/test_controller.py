@@ -44,7 +44,7 @@ def fresh(name: str) -> Controller:
     return controller
 
 
-@pytest.mark.parametrize("name", sorted({*CONTROLLERS} - LEARNED))
+@every_controller
 @pytest.mark.parametrize("twin_of", [copy.deepcopy, lambda c: pickle.loads(pickle.dumps(c))])
 def test_a_copy_and_a_pickle_go_on_bit_for_bit(
     name: str, twin_of: Callable[[Controller], Controller]

@@ -35,6 +35,7 @@ from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.learning_figure import draw_learning
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.statistics import paired_difference
+from baselines.rl.onnx_policy import table1_means
 from baselines.rl.validation import VALIDATION, VALIDATION_SEEDS, drive
 from crane_env import CraneParameters
 from crane_env.operators.registry import OperatorSpec
@@ -163,7 +164,7 @@ def training_sections(options: Options) -> list[str]:
     limits = means_on_table1()
     for file in cards:
         card = json.loads(file.read_text(encoding="utf-8"))
-        means = card["table1_means"]
+        means = table1_means(card)
         wins = all(means[index] < limits[index] for index in ("IAE", "release_drift"))
         rows.append(
             [

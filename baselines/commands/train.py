@@ -11,10 +11,11 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from baselines.commands.evaluate import crane_parameters
 from baselines.commands.terminal import Job, progress_bars, run
 from baselines.rl.settings import TrainingSettings
+from crane_env.parameters import CraneParameters
 from crane_env.support.extras import require
 
 PROGRAM = "oilcrane train"
@@ -42,6 +43,9 @@ class Options:
         output: folder of the runs.
         export: instead of training, export this checkpoint.zip or Stable-Baselines3 model.
         policy: where to: the .onnx file.
+        parameters: crane that an exported model was trained on: a preset, or a JSON object, or a
+            file with one. A checkpoint knows its own.
+        statistics: what VecNormalize.save wrote, if an exported model was trained in one.
     """
 
     algorithm: str = "ppo"
@@ -56,6 +60,8 @@ class Options:
     output: Path = Path("results/train_rl")
     export: Path | None = None
     policy: Path = Path("policy.onnx")
+    parameters: str | None = None
+    statistics: Path | None = None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -74,17 +80,30 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     if options.export is not None:
         if not options.export.is_file():
             raise FileNotFoundError(f"There is no model {str(options.export)!r}.")
-        return functools.partial(export, options.export, options, command)
+        given = options.parameters
+        crane = None if given is None else crane_parameters(given)
+        return functools.partial(export, options.export, options, crane, command)
+    if options.parameters is not None or options.statistics is not None:
+        raise ValueError("parameters and statistics belong to --export.")
     runs = all_settings(options)
     require("stable_baselines3", extra="rl")
     return functools.partial(train_all, runs, options.output, command)
 
 
-def export(checkpoint: Path, options: Options, command: Sequence[str]) -> None:
+def export(
+    model: Path, options: Options, crane: CraneParameters | None, command: Sequence[str]
+) -> None:
     """Exports a trained policy with its card."""
     from baselines.rl.export import export_file
 
-    export_file(checkpoint, options.policy, options.algorithm, command)
+    export_file(
+        model,
+        options.policy,
+        algorithm=options.algorithm,
+        command=command,
+        crane=crane,
+        statistics=options.statistics,
+    )
     print(f"Policy: {options.policy}, card: {options.policy.with_suffix('.json')}.")
 
 
@@ -133,7 +152,8 @@ def train_all(runs: Sequence[TrainingSettings], output: Path, command: Sequence[
 
 def train_one(settings: TrainingSettings, folder: Path, command: Sequence[str]) -> None:
     """Trains behind a progress bar, exports the policy and says what it reached."""
-    from baselines.rl.export import export_policy, write_card
+    from baselines.rl.export import export_run
+    from baselines.rl.onnx_policy import table1_means
     from baselines.rl.training import train
     from baselines.rl.validation import Validation
 
@@ -150,9 +170,8 @@ def train_one(settings: TrainingSettings, folder: Path, command: Sequence[str]) 
 
         model, progress = train(settings, folder, on_progress=show)
     policy = folder / "policy.onnx"
-    export_policy(model, policy, settings.acceleration_scale)
-    card = write_card(policy, settings, progress, command=command)
-    means: dict[str, Any] = card["table1_means"]
+    card = export_run(model, settings, progress, policy, command=command)
+    means = table1_means(card)
     print(
         f"{folder.name}: {progress.steps} steps in {progress.seconds / 60:.1f} min; Table I: "
         f"IAE {means['IAE']:.3f} m, release drift {means['release_drift']:.3f} m. "

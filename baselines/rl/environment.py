@@ -1,7 +1,7 @@
 """Training environment: many cranes as a learner sees them.
 
 Four things lie between the environment and the learner. The learner's actions from -1 to 1 are
-scaled to accelerations; its reward is one of `rewards`; each action is held for several
+scaled to accelerations; its reward is one of `settings.REWARDS`; each action is held for several
 control periods, whose rewards are summed; and the first episodes end at random times.
 
 In one control period of 20 ms an action moves the payload by so little that what it was worth
@@ -24,9 +24,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from baselines.rl.rewards import REWARDS
 from baselines.rl.sb3_vector_env import Sb3VectorEnv
-from baselines.rl.settings import TrainingSettings
+from baselines.rl.settings import REWARDS, TrainingSettings
 
 TERMS = ("reward_tracking", "reward_sway", "reward_acceleration")
 
@@ -42,7 +41,7 @@ class LearnersView(VectorWrapper[NDArray[np.float64], NDArray[Any], NDArray[Any]
     def __init__(self, env: VectorEnv[Any, Any, Any], settings: TrainingSettings) -> None:
         super().__init__(env)
         self._scale = settings.acceleration_scale
-        self._reward = REWARDS[settings.reward]
+        self._reward = settings.reward
         self._control_period = settings.parameters.control_period
         self._hold = settings.action_hold
         random = np.random.default_rng(settings.environment_seed)
@@ -72,7 +71,7 @@ class LearnersView(VectorWrapper[NDArray[np.float64], NDArray[Any], NDArray[Any]
         for _ in range(self._hold):
             going = ~(terminated | truncated)
             observations, _, failed, timed_out, infos = self.env.step(self._scale * actions)
-            rewards += going * self._reward(self._terms(infos), self._control_period)
+            rewards += going * REWARDS[self._reward](self._terms(infos), self._control_period)
             for index in np.flatnonzero(going & (failed | timed_out)).tolist():
                 last[index] = infos["final_obs"][index]
             terminated |= going & failed

@@ -137,7 +137,7 @@ class Recorder(BaseCallback):
         )
         costs = [earlier.stage_cost for earlier in self.progress.curve]
         best = self.progress.best
-        if point.stage_cost < min(costs, default=math.inf):
+        if best is None or point.stage_cost < min(costs):
             weights = self.model.policy.state_dict()
             best = {name: tensor.detach().clone() for name, tensor in weights.items()}
         curve = (*self.progress.curve, point)

@@ -10,11 +10,11 @@ Importing this module needs the extra "rl".
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from numpy.typing import NDArray
 
 from crane_env.support.extras import require
@@ -35,11 +35,11 @@ class Sb3VectorEnv(VecEnv):
 
     The info of an environment has only what Stable-Baselines3 reads: at the end of an episode
     `terminal_observation`, `TimeLimit.truncated` and `episode` with return "r", length "l" and
-    seconds since the start "t", as `Monitor` gives them. All else that a step reports is in
+    seconds "t", as `Monitor` names them. All else that a step reports is in
     `infos`, as arrays: a thousand dictionaries a step cost as much as the learner's arithmetic.
 
     Attributes:
-        env: the vector environment.
+        env: the vector environment, recording episodes' statistics.
         infos: info of the last step or reset in Gymnasium's vector layout.
 
     Args:
@@ -56,12 +56,9 @@ class Sb3VectorEnv(VecEnv):
             raise ValueError(
                 f"Stable-Baselines3 needs autoreset_mode=AutoresetMode.SAME_STEP, not {mode}."
             )
-        self.env = env
+        self.env = RecordEpisodeStatistics(env)
         self.infos: dict[str, Any] = {}
         self._actions: NDArray[Any] | None = None
-        self._returns = np.zeros(env.num_envs)
-        self._lengths = np.zeros(env.num_envs, dtype=np.int64)
-        self._start = perf_counter()
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self) -> NDArray[Any]:
@@ -79,8 +76,6 @@ class Sb3VectorEnv(VecEnv):
         )
         self._reset_seeds()
         self._reset_options()
-        self._returns[:] = 0.0
-        self._lengths[:] = 0
         return np.asarray(observations)
 
     def step_async(self, actions: NDArray[Any]) -> None:
@@ -97,8 +92,6 @@ class Sb3VectorEnv(VecEnv):
             ended, and infos.
         """
         observations, rewards, terminated, truncated, self.infos = self.env.step(self._actions)
-        self._returns += rewards
-        self._lengths += 1
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for index in np.flatnonzero(done).tolist():
@@ -106,13 +99,9 @@ class Sb3VectorEnv(VecEnv):
                 "terminal_observation": self.infos["final_obs"][index],
                 "TimeLimit.truncated": bool(truncated[index] and not terminated[index]),
                 "episode": {
-                    "r": float(self._returns[index]),
-                    "l": int(self._lengths[index]),
-                    "t": perf_counter() - self._start,
+                    name: values[index].item() for name, values in self.infos["episode"].items()
                 },
             }
-        self._returns[done] = 0.0
-        self._lengths[done] = 0
         return observations, rewards.astype(np.float32), done, infos
 
     def close(self) -> None:
@@ -126,7 +115,7 @@ class Sb3VectorEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Rows = None) -> list[Any]:
         """An attribute of the vector environment, once for each environment asked about."""
-        return [getattr(self.env, attr_name) for _ in self._get_indices(indices)]
+        return [getattr(self.env.env, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Rows = None) -> None:
         """Refused: environments that step together have no attributes of their own.

@@ -1,32 +1,60 @@
-"""Training settings: all that determines a training run, as plain data."""
+"""Training settings: all that determines a training run, as plain data.
+
+A learner maximises one of three rewards, functions of the three terms of the environment's reward,
+which is minus the stage cost of eq. (6) times the control period T_s:
+
+    "stage-cost"        the environment's reward: -((y - w)^2 + lambda_1 d^2 + lambda_u u^2) T_s
+    "absolute-error"    -(|y - w| + lambda_1 d^2 + lambda_u u^2) T_s, whose first term sums to IAE
+    "tracking"          -((y - w)^2 + lambda_u u^2) T_s, the sway left to itself
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from baselines.rl.rewards import REWARDS
+import numpy as np
+from numpy.typing import NDArray
+
 from crane_env.environment.randomisation import Randomisation
 from crane_env.operators.registry import make_operator
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
+from crane_env.support.checks import SEED_LIMIT, choice, positive, shown, whole
+from crane_env.support.fields import check_fields, from_fields
+
+Terms = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+"""`reward_tracking`, `reward_sway` and `reward_acceleration` of the cranes, shape (N,) each."""
+
+REWARDS: dict[str, Callable[[Terms, float], NDArray[np.float64]]] = {
+    "stage-cost": lambda terms, period: terms[0] + terms[1] + terms[2],
+    # The tracking term is -(y - w)^2 T_s.
+    "absolute-error": lambda terms, period: -np.sqrt(-terms[0] * period) + terms[1] + terms[2],
+    "tracking": lambda terms, period: terms[0] + terms[2],
+}
+"""Rewards of the cranes, shape (N,), from the terms and the control period [s], by name."""
 
 TRAINING_SEEDS = 10_000_000
 """Training seed s has the environment seeds from `TRAINING_SEEDS` + s * `SEED_STRIDE` on. The test
 set is the manoeuvres of seeds 0 to 999, validation has seeds of its own, and none of them meet."""
 
-COUNTS = (
-    "episode_steps",
-    "action_hold",
-    "evaluation_interval",
-    "checkpoint_interval",
-    "validation_manoeuvres",
-)
-
 SEED_STRIDE = 10_000
 """Most environments that one training run can have."""
+
+WHOLE: dict[str, tuple[int, int]] = {
+    "seed": (0, 2**32),
+    "steps": (1, SEED_LIMIT),
+    "environments": (1, SEED_STRIDE + 1),
+    "episode_steps": (1, SEED_LIMIT),
+    "action_hold": (1, SEED_LIMIT),
+    "evaluation_interval": (1, SEED_LIMIT),
+    "checkpoint_interval": (1, SEED_LIMIT),
+    "validation_manoeuvres": (1, SEED_STRIDE + 1),
+}
+"""Settings that are whole numbers: the least of them, and what they are below. A seed is also one
+of NumPy's first generator; cranes fit into memory, and the rest into a float."""
 
 LENGTHS = (6.5, 11.0)
 """Initial cable lengths of the training episodes [m]: an agent that has only seen one length has
@@ -183,45 +211,45 @@ class TrainingSettings:
 
     def __post_init__(self) -> None:
         """Fills in the algorithm's defaults and refuses settings that make no sense."""
-        if self.algorithm not in ALGORITHMS:
-            raise ValueError(
-                f"Unknown algorithm {self.algorithm!r}; valid: {', '.join(ALGORITHMS)}."
-            )
-        if self.reward not in REWARDS:
-            raise ValueError(f"Unknown reward {self.reward!r}; valid: {', '.join(REWARDS)}.")
-        default = ALGORITHMS[self.algorithm]
+        default = ALGORITHMS[choice("algorithm", self.algorithm, ALGORITHMS)]
+        choice("reward", self.reward, REWARDS)
         for name in ("steps", "environments", "operator"):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, getattr(default, name))
-        for name in ("steps", "environments", *COUNTS):
-            _check_whole(name, getattr(self, name), least=1)
-        _check_whole("seed", self.seed, least=0)
-        if self.count > SEED_STRIDE:
-            raise ValueError(f"environments must be at most {SEED_STRIDE}, not {self.count}.")
+        for name, (least, below) in WHOLE.items():
+            check_fields(self, whole, (name,), least, below)
+        if not isinstance(self.randomise, bool):
+            raise ValueError(f"randomise must be True or False, not {shown(self.randomise)}.")
         make_operator(self.buttons)
         object.__setattr__(self, "parameters", CraneParameters.of(self.parameters))
         object.__setattr__(self, "cost", StageCost.of(self.cost))
-        limit = self.parameters.acceleration_max
-        if not 0.0 < self.acceleration_scale <= limit:
+        check_fields(self, positive, ("acceleration_scale",))
+        if self.acceleration_scale > self.parameters.acceleration_max:
             raise ValueError(
-                f"acceleration_scale must be above 0 and at most the crane's {limit} m/s^2, "
-                f"not {self.acceleration_scale!r}."
+                "acceleration_scale must be at most the crane's "
+                f"{self.parameters.acceleration_max} m/s^2, not {self.acceleration_scale}."
+            )
+        if not isinstance(self.hyperparameters, Mapping):
+            raise ValueError(
+                "hyperparameters must map the names of the algorithm's arguments to values, "
+                f"not {shown(self.hyperparameters)}."
             )
         merged = {**default.hyperparameters, **self.hyperparameters}
         object.__setattr__(self, "hyperparameters", merged)
 
     @classmethod
-    def of(cls, mapping: Mapping[str, Any]) -> TrainingSettings:
+    def of(cls, value: TrainingSettings | Mapping[str, Any] | None) -> TrainingSettings:
         """Reads what `as_dict` and JSON made of settings.
 
         Raises:
             ValueError: an unknown field, or a value out of range.
         """
-        unknown = sorted(set(mapping) - set(cls.__dataclass_fields__))
-        if unknown:
-            valid = ", ".join(cls.__dataclass_fields__)
-            raise ValueError(f"Unknown training setting {unknown[0]!r}; valid: {valid}.")
-        return cls(**mapping)
+        return from_fields(
+            cls,
+            value,
+            must_be="Training settings must be TrainingSettings or a mapping",
+            unknown="training setting",
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, with every default filled in."""
@@ -259,8 +287,3 @@ class TrainingSettings:
     def randomisation(self) -> Randomisation:
         """Ranges of the episodes' cranes."""
         return DOMAIN if self.randomise else Randomisation(cable_length_initial=LENGTHS)
-
-
-def _check_whole(name: str, value: object, *, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}.")

@@ -12,8 +12,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from crane_env.episode.metrics import after_release, integral_absolute_error
-from crane_env.observation import Observation
+from crane_env.controller import Controller
+from crane_env.episode.play import run_episodes
 from crane_env.operators.registry import OperatorSpec
 from crane_env.operators.table1 import TABLE_1
 from crane_env.parameters import CraneParameters
@@ -25,13 +25,16 @@ VALIDATION_SEEDS = 1_000_000
 VALIDATION = {"name": "manoeuvre", "backward_probability": 0.5}
 """Operator of the validation manoeuvres; both directions, so that leaning to one does not pay."""
 
+INDICES = ("stage_cost", "IAE", "release_drift", "max_sway")
+"""What is told of every manoeuvre; see `crane_env.episode.metrics`."""
+
 Policy = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Trolley accelerations [m/s^2], shape (N, 1), for observations, shape (N, 8)."""
 
 
 @dataclass(frozen=True)
 class Validation:
-    """Means over manoeuvres; see `crane_env.episode.metrics`.
+    """Means over manoeuvres, infinite if one of them failed; see `drive`.
 
     Attributes:
         steps: environment steps that the policy was trained for.
@@ -89,6 +92,9 @@ def drive(
 ) -> dict[str, NDArray[np.float64]]:
     """Plays one episode of each operator.
 
+    A crane whose simulation diverges, or whose policy answers what is no number, has failed: what
+    was played until then is no measure of the policy. The other cranes go on.
+
     Args:
         policy: drives all cranes.
         operators: one for each crane.
@@ -97,7 +103,7 @@ def drive(
         cost: weights of the stage cost.
 
     Returns:
-        `stage_cost`, `IAE`, `release_drift` and `max_sway` of each crane, shape (N,).
+        `INDICES` of each crane, shape (N,); infinite where it has failed.
     """
     env = gymnasium.make_vec(
         "OILCrane-v0",
@@ -105,34 +111,31 @@ def drive(
         operator=list(operators),
         parameters=parameters,
         cost=cost,
-        autoreset_mode=AutoresetMode.DISABLED,
+        autoreset_mode=AutoresetMode.NEXT_STEP,
     )
-    observations, infos = env.reset(seed=seed)
-    seen, positions, velocities, rewards = [], [], [], []
-    ended = np.zeros(len(operators), dtype=np.bool_)
-    while not ended.any():
-        seen.append(observations)
-        positions.append(infos["payload_position"])
-        velocities.append(infos["payload_velocity"])
-        observations, reward, terminated, truncated, infos = env.step(policy(observations))
-        rewards.append(reward)
-        ended = terminated | truncated
+    driver = _Driver(policy, len(operators))
+    trajectories = run_episodes(env, driver, seed=seed)
     env.close()
-    period = parameters.control_period
-    fields = Observation._fields
-    history = np.array(seen)
-    references = history[:, :, fields.index("travel_reference")].T
-    tracks = zip(references, np.array(velocities).T, np.array(positions).T, strict=True)
-    iae, drift = zip(
-        *(
-            (integral_absolute_error(w, y, period), after_release(w, x, period)[0])
-            for w, y, x in tracks
-        ),
-        strict=True,
-    )
+    failed = driver.lost | np.array([one.simulation_failed for one in trajectories])
+    measured = [one.metrics() for one in trajectories]
     return {
-        "stage_cost": -np.sum(rewards, axis=0),
-        "IAE": np.array(iae),
-        "release_drift": np.array(drift),
-        "max_sway": np.abs(history[:, :, fields.index("sway_angle")]).max(axis=0),
+        name: np.where(failed, np.inf, [getattr(one, name) for one in measured]) for name in INDICES
     }
+
+
+class _Driver(Controller):
+    """A policy that drives N cranes; `lost` are those for which it had no number, shape (N,)."""
+
+    def __init__(self, policy: Policy, count: int) -> None:
+        self._policy = policy
+        self.lost = np.zeros(count, dtype=np.bool_)
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def act(self, observation: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Accelerations, shape (N, 1); none where there is no number."""
+        asked = self._policy(observation)
+        usable = np.isfinite(asked)
+        self.lost |= ~usable[:, 0]
+        return np.where(usable, asked, 0.0)

@@ -1,9 +1,9 @@
-"""Policy export: the exported graph answers what the trained model answers, without PyTorch."""
+"""Policy export: the graph asks for what the model asked for in its environment, or is refused."""
 
 from __future__ import annotations
 
-import json
-import subprocess
+import dataclasses
+import pickle
 import sys
 import zipfile
 from pathlib import Path
@@ -11,42 +11,27 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import onnx
 import pytest
 import torch
-from stable_baselines3 import PPO, SAC
+from gymnasium.wrappers import FrameStackObservation, NormalizeObservation, RescaleAction
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 import crane_env  # noqa: F401  registers OILCrane-v0
-from baselines.rl.export import export_file, export_policy, write_card
+from baselines.rl import export
+from baselines.rl.export import export_file, export_policy
 from baselines.rl.onnx_policy import OnnxPolicy, read_card
-from baselines.rl.recorder import CHECKPOINT, policy_of
+from baselines.rl.recorder import policy_of
 from baselines.rl.settings import TrainingSettings
-from baselines.rl.training import new_model, train
+from baselines.rl.trained import Trained
+from baselines.rl.training import new_model
 from crane_env.parameters import CraneParameters
 
 ROOT = Path(__file__).parents[2]
 
 FLOAT32 = 5e-5
 """Rounding of actions up to 5 m/s^2 in networks of float32 [m/s^2]."""
-
-TINY = TrainingSettings(
-    steps=2400,
-    environments=6,
-    evaluation_interval=2400,
-    checkpoint_interval=2400,
-    validation_manoeuvres=2,
-    hyperparameters={"n_steps": 50, "batch_size": 100, "n_epochs": 4},
-)
-
-WITHOUT_TORCH = """
-import sys
-
-class Blocked:
-    def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] in ("torch", "stable_baselines3", "onnx"):
-            raise ImportError(f"{name} is blocked")
-
-sys.meta_path.insert(0, Blocked())
-"""
 
 
 def observations(count: int = 300) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -69,46 +54,6 @@ def stirred(model: Any) -> Any:
     return model
 
 
-def test_a_policy_trained_for_real_acts_the_same_exported_and_reloaded_without_torch(
-    tmp_path: Path,
-) -> None:
-    model, progress = train(TINY, tmp_path)
-    file = tmp_path / "policy.onnx"
-    export_policy(model, file, TINY.acceleration_scale)
-    card = write_card(file, TINY, progress, command=["scripts/train_rl.py", "--steps", "2400"])
-    seen = observations()
-    expected = policy_of(model, TINY.acceleration_scale)(seen)
-    assert np.abs(expected).max() > 0.01
-    np.save(tmp_path / "seen.npy", seen)
-    code = WITHOUT_TORCH + (
-        "import numpy\n"
-        "from baselines.rl.onnx_policy import OnnxPolicy, read_card\n"
-        "policy = OnnxPolicy(sys.argv[1])\n"
-        "read_card(sys.argv[1])\n"
-        "numpy.save(sys.argv[3], policy.accelerations(numpy.load(sys.argv[2])))\n"
-        "assert not {'torch', 'stable_baselines3', 'onnx'} & set(sys.modules)\n"
-    )
-    subprocess.run(
-        [sys.executable, "-c", code, file, tmp_path / "seen.npy", tmp_path / "answer.npy"],
-        check=True,
-        cwd=ROOT,
-    )
-    answer = np.load(tmp_path / "answer.npy")
-    assert answer.dtype == np.float64
-    np.testing.assert_allclose(answer, expected, rtol=0, atol=FLOAT32)
-
-    assert read_card(file) == json.loads(json.dumps(card))
-    assert card["command"][0] == "scripts/train_rl.py"
-    assert card["steps"] == progress.steps == 2400
-    assert card["settings"]["hyperparameters"]["n_steps"] == 50
-    assert set(card["table1"]) == {"IAE", "release_drift", "stage_cost", "max_sway"}
-    assert len(card["table1"]["IAE"]) == 10
-    assert {"torch", "stable-baselines3", "mujoco"} <= set(card["versions"])
-
-    export_file(tmp_path / CHECKPOINT, tmp_path / "again.onnx", "ppo", ["again"])
-    np.testing.assert_array_equal(OnnxPolicy(tmp_path / "again.onnx").accelerations(seen), answer)
-
-
 @pytest.mark.parametrize("algorithm", ["ppo", "sac", "td3"])
 def test_exported_actions_are_those_of_predict_in_every_kind_of_policy(
     algorithm: str, tmp_path: Path
@@ -116,8 +61,10 @@ def test_exported_actions_are_those_of_predict_in_every_kind_of_policy(
     batches = {"n_steps": 8, "batch_size": 16} if algorithm == "ppo" else {}
     settings = TrainingSettings(algorithm=algorithm, environments=2, hyperparameters=batches)
     model = stirred(new_model(settings))
-    export_policy(model, tmp_path / "policy.onnx", settings.acceleration_scale)
-    exported = OnnxPolicy(tmp_path / "policy.onnx")
+    trained = Trained(
+        model=model, crane=settings.parameters, acceleration_scale=settings.acceleration_scale
+    )
+    exported = export_policy(trained, tmp_path / "policy.onnx")
     seen = observations()
     expected = policy_of(model, settings.acceleration_scale)(seen)
     assert np.ptp(expected) > 0.5
@@ -125,48 +72,142 @@ def test_exported_actions_are_those_of_predict_in_every_kind_of_policy(
     np.testing.assert_allclose(exported.accelerations(seen[:1]), expected[:1], rtol=0, atol=FLOAT32)
 
 
+def crane(parameters: CraneParameters, *, rescaled: bool) -> gymnasium.Env[Any, Any]:
+    env = gymnasium.make("OILCrane-v0", parameters=parameters, max_episode_steps=50)
+    return RescaleAction(env, np.float32(-1.0), np.float32(1.0)) if rescaled else env
+
+
+def model_on(env: Any) -> Any:
+    """An agent on an environment, all weights drawn anew."""
+    sizes: dict[str, Any] = {"n_steps": 16, "batch_size": 16, "n_epochs": 1}
+    return stirred(PPO("MlpPolicy", env, policy_kwargs={"net_arch": [16]}, device="cpu", **sizes))
+
+
+def exported(model: Any, folder: Path, **given: Any) -> OnnxPolicy:
+    """What a file that the model saved is exported to."""
+    model.save(folder / "model.zip")
+    target = folder / "policy.onnx"
+    export_file(folder / "model.zip", target, algorithm="ppo", command=["export"], **given)
+    return OnnxPolicy(target)
+
+
 @pytest.mark.parametrize("rescaled", [False, True])
-def test_a_model_that_stable_baselines_saved_is_exported_with_the_scale_of_its_actions(
-    rescaled: bool, tmp_path: Path
+@pytest.mark.parametrize("limit", [0.3, 1.0, 5.0])
+def test_a_saved_model_is_exported_with_the_accelerations_of_its_own_crane(
+    limit: float, rescaled: bool, tmp_path: Path
 ) -> None:
-    env: Any = gymnasium.make("OILCrane-v0")
-    if rescaled:
-        env = gymnasium.wrappers.RescaleAction(env, np.float32(-1.0), np.float32(1.0))
-    model = stirred(SAC("MlpPolicy", env, policy_kwargs={"net_arch": [16]}, device="cpu"))
-    model.save(tmp_path / "model.zip")
-    export_file(tmp_path / "model.zip", tmp_path / "policy.onnx", "sac", ["export"])
+    parameters = dataclasses.replace(CraneParameters.field(), acceleration_max=limit)
+    env = crane(parameters, rescaled=rescaled)
+    model = model_on(env)
+    policy = exported(model, tmp_path, crane=parameters)
     seen = observations()
     actions, _ = model.predict(seen, deterministic=True)
-    scale = CraneParameters().acceleration_max if rescaled else 1.0
-    answers = OnnxPolicy(tmp_path / "policy.onnx").accelerations(seen)
-    np.testing.assert_allclose(answers, scale * actions, rtol=0, atol=1e-5)
-    assert np.abs(answers).max() > 0.5
-    assert read_card(tmp_path / "policy.onnx")["acceleration_scale"] == scale
+    asked = actions * limit if rescaled else actions
+    np.testing.assert_allclose(policy.accelerations(seen), asked, rtol=0, atol=1e-5 * limit)
+    assert np.ptp(asked) > 0.5 * min(limit, 1.0)
+    assert policy.acceleration_max == pytest.approx(limit)
+    assert CraneParameters.of(read_card(tmp_path / "policy.onnx")["parameters"]) == parameters
 
 
-def test_the_graph_tells_nothing_of_the_machine_it_was_made_on(tmp_path: Path) -> None:
-    export_policy(new_model(TINY), tmp_path / "policy.onnx", 1.0)
+@pytest.mark.parametrize("rescaled", [False, True])
+@pytest.mark.parametrize("norm_obs", [False, True])
+def test_the_statistics_of_a_vecnormalize_are_in_the_graph_or_asked_for(
+    norm_obs: bool, rescaled: bool, tmp_path: Path
+) -> None:
+    vector = DummyVecEnv([lambda: crane(CraneParameters(), rescaled=rescaled)])
+    env = VecNormalize(vector, norm_obs=norm_obs, clip_obs=2.0)
+    model = model_on(env)
+    model.learn(128)
+    given = {"crane": CraneParameters()}
+    with pytest.raises(ValueError, match=r"was trained in a VecNormalize: give the file of stat"):
+        exported(model, tmp_path, **given)
+    assert not (tmp_path / "policy.onnx").exists()
+    env.save(str(tmp_path / "statistics.pkl"))
+    policy = exported(model, tmp_path, statistics=tmp_path / "statistics.pkl", **given)
+    seen = observations()
+    actions, _ = model.predict(env.normalize_obs(seen), deterministic=True)
+    asked = actions * (5.0 if rescaled else 1.0)
+    np.testing.assert_allclose(policy.accelerations(seen), asked, rtol=0, atol=FLOAT32)
+    assert np.ptp(asked) > 0.5
+
+
+# NormalizeObservation makes a float32 box of float64 bounds, whatever it wraps.
+@pytest.mark.filterwarnings("ignore:.*precision lowered by casting")
+@pytest.mark.parametrize(
+    ("wrapped", "parameters", "message"),
+    [
+        (lambda env: env, None, "neither the accelerations of this crane, from -5.0 to 5.0"),
+        (
+            lambda env: RescaleAction(env, np.float32(-1.0), np.float32(1.0)),
+            None,
+            "from -1 to 1, do not tell its crane's accelerations: give the parameters",
+        ),
+        (
+            lambda env: RescaleAction(env, np.float32(-2.0), np.float32(2.0)),
+            "field",
+            "from -2 to 2, are neither",
+        ),
+        (NormalizeObservation, "field", "observations are not those of this crane in SI units"),
+        (lambda env: env, {"acceleration_max": 0.3}, "it was trained on another one"),
+        (lambda env: FrameStackObservation(env, 3), "field", r"this model has \(3, 8\)"),
+    ],
+)
+def test_a_model_whose_accelerations_are_unknown_is_refused(
+    wrapped: Any, parameters: Any, message: str, tmp_path: Path
+) -> None:
+    model = model_on(wrapped(crane(CraneParameters.field(), rescaled=False)))
+    given = None if parameters is None else CraneParameters.of(parameters)
+    with pytest.raises(ValueError, match=message):
+        exported(model, tmp_path, crane=given)
+    assert not (tmp_path / "policy.onnx").exists()
+
+
+def test_a_graph_that_asks_for_something_else_than_its_model_is_not_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = model_on(crane(CraneParameters(), rescaled=False))
+    graph = export._graph
+    monkeypatch.setattr(
+        export, "_graph", lambda t: graph(dataclasses.replace(t, acceleration_scale=1.01))
+    )
+    with pytest.raises(ValueError, match=r"differ by .* from the model's in its own environment"):
+        exported(model, tmp_path)
+    assert not list(tmp_path.glob("*.onnx*"))
+
+
+def test_the_graph_tells_what_goes_in_and_out_and_nothing_of_the_machine(tmp_path: Path) -> None:
+    model = model_on(crane(CraneParameters.field(), rescaled=True))
+    policy = exported(model, tmp_path, crane=CraneParameters.field())
+    assert (policy.control_period, policy.acceleration_max) == (0.02, 0.3)
     data = (tmp_path / "policy.onnx").read_bytes()
     for name in (str(ROOT), sys.prefix, ".py"):
         assert name.encode() not in data
+    graph = onnx.load_from_string(data).graph
+    assert "sway_angle [rad], sway_rate [rad/s]" in graph.input[0].doc_string
+    assert graph.output[0].doc_string == "trolley acceleration [m/s^2], from -0.3 to 0.3"
 
 
-def test_a_model_of_another_shape_and_a_file_that_is_none_are_refused(tmp_path: Path) -> None:
-    other = PPO("MlpPolicy", gymnasium.make("Pendulum-v1"), n_steps=8, batch_size=8, device="cpu")
-    with pytest.raises(ValueError, match=r"observations of shape \(8,\) .* has \(3,\) and \(1,\)"):
-        export_policy(other, tmp_path / "policy.onnx", 1.0)
-    assert not (tmp_path / "policy.onnx").exists()
-
-    other.save(tmp_path / "other.zip")
-    with pytest.raises(ValueError, match="observations of shape"):
-        export_file(tmp_path / "other.zip", tmp_path / "policy.onnx", "ppo", [])
-    with pytest.raises(ValueError, match="Unknown algorithm 'magic'; valid: ppo, sac"):
-        export_file(tmp_path / "other.zip", tmp_path / "policy.onnx", "magic", [])
-    with pytest.raises(FileNotFoundError, match="There is no model"):
-        export_file(tmp_path / "none.zip", tmp_path / "policy.onnx", "ppo", [])
+def test_what_is_no_model_or_no_statistics_is_refused(tmp_path: Path) -> None:
+    model_on(crane(CraneParameters(), rescaled=False)).save(tmp_path / "model.zip")
+    model_on(gymnasium.make("Pendulum-v1")).save(tmp_path / "pendulum.zip")
     (tmp_path / "text.zip").write_text("no model")
+    (tmp_path / "list.pkl").write_bytes(pickle.dumps([]))
     with zipfile.ZipFile(tmp_path / "empty.zip", "w") as archive:
         archive.writestr("something", "else")
-    for name in ("text.zip", "empty.zip"):
-        with pytest.raises(ValueError, match="is no ppo model of Stable-Baselines3"):
-            export_file(tmp_path / name, tmp_path / "policy.onnx", "ppo", [])
+    for name, given, message in (
+        ("none.zip", {}, "There is no model"),
+        ("text.zip", {}, "is no ppo model of Stable-Baselines3"),
+        ("empty.zip", {}, "is no ppo model of Stable-Baselines3"),
+        ("model.zip", {"algorithm": "magic"}, "Unknown algorithm 'magic'; valid: ppo, sac"),
+        ("pendulum.zip", {}, r"observations of shape \(8,\) .* has \(3,\) and \(1,\)"),
+        ("model.zip", {"statistics": tmp_path / "none.pkl"}, "There is no file of statistics"),
+        ("model.zip", {"statistics": tmp_path / "text.zip"}, "is not what VecNormalize.save"),
+        ("model.zip", {"statistics": tmp_path / "list.pkl"}, "wrote: it holds a list"),
+    ):
+        with pytest.raises((ValueError, FileNotFoundError), match=message):
+            export_file(
+                tmp_path / name,
+                tmp_path / "policy.onnx",
+                **{"algorithm": "ppo", "command": [], **given},
+            )
+    assert not (tmp_path / "policy.onnx").exists()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
+import math
 import os
 import shutil
 import signal
@@ -11,6 +13,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -21,36 +24,45 @@ from gymnasium.vector import AutoresetMode
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import crane_env  # noqa: F401  registers OILCrane-v0
-from baselines.rl.checkpoint import is_checkpoint, load_checkpoint, read_settings
+from baselines.rl import validation
+from baselines.rl.checkpoint import (
+    Progress,
+    is_checkpoint,
+    load_checkpoint,
+    read_settings,
+    save_checkpoint,
+)
 from baselines.rl.environment import LearnersView, training_environment
+from baselines.rl.export import export_file, export_run
 from baselines.rl.network import CraneFeatures, GainScheduledPolicy
-from baselines.rl.recorder import CHECKPOINT, CURVE, policy_of, read_curve
-from baselines.rl.rewards import REWARDS
-from baselines.rl.settings import ALGORITHMS, TRAINING_SEEDS, TrainingSettings
+from baselines.rl.onnx_policy import OnnxPolicy, read_card
+from baselines.rl.recorder import CHECKPOINT, CURVE, Recorder, policy_of, read_curve
+from baselines.rl.settings import ALGORITHMS, REWARDS, TRAINING_SEEDS, TrainingSettings
 from baselines.rl.training import TENSORBOARD, new_model, train
-from baselines.rl.validation import VALIDATION, VALIDATION_SEEDS, drive
-from crane_env.observation import observation_space
+from baselines.rl.validation import VALIDATION, VALIDATION_SEEDS, Validation, drive
+from crane_env.observation import Observation, observation_space
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
+from tests.rl.test_export import FLOAT32, observations
 
 ROOT = Path(__file__).parents[2]
 
 TINY: dict[str, Any] = {
-    "steps": 4800,
+    "steps": 2400,
     "environments": 6,
     "evaluation_interval": 2400,
     "checkpoint_interval": 1200,
     "validation_manoeuvres": 2,
 }
 TINY_PPO = TrainingSettings(
-    **TINY, hyperparameters={"n_steps": 50, "batch_size": 100, "n_epochs": 2}
+    **TINY, hyperparameters={"n_steps": 25, "batch_size": 50, "n_epochs": 2}
 )
 TINY_SAC = TrainingSettings(
     algorithm="sac",
     **TINY,
     hyperparameters={
         "buffer_size": 4000,
-        "learning_starts": 300,
+        "learning_starts": 150,
         "batch_size": 32,
         "gradient_steps": 1,
         "train_freq": 8,
@@ -97,16 +109,16 @@ def test_a_run_killed_by_sigkill_and_resumed_ends_bit_for_bit_as_one_that_was_no
     )
     assert process.stdout is not None
     for line in process.stdout:
-        if int(line) > 3000:  # between two checkpoints
+        if int(line) > 1500:  # between two checkpoints
             os.kill(process.pid, signal.SIGKILL)
             break
     assert process.wait() == -signal.SIGKILL
     process.stdout.close()
     kept = json.loads(zipfile.ZipFile(folder / CHECKPOINT).read("checkpoint.json"))["steps"]
-    assert 0 < kept < 4800
+    assert 0 < kept < 2400
 
     model, progress = train(TINY_PPO, folder)
-    assert progress.steps == 4800
+    assert progress.steps == 2400
     resumed = weights(model)
     assert all(torch.equal(expected[name], resumed[name]) for name in expected)
     assert without_time(folder) == without_time(whole)
@@ -122,6 +134,45 @@ def logged(folder: Path) -> dict[str, list[tuple[int, float]]]:
     }
 
 
+def test_the_policy_of_a_run_acts_the_same_exported_and_reloaded_without_torch(
+    uninterrupted: tuple[Path, Any], tmp_path: Path
+) -> None:
+    model, progress = load_checkpoint(uninterrupted[0] / CHECKPOINT)
+    progress = dataclasses.replace(progress, best=model.policy.state_dict())  # never mind which
+    checkpoint = tmp_path / CHECKPOINT
+    save_checkpoint(checkpoint, TINY_PPO, model, progress)
+    file, command = tmp_path / "policy.onnx", ["scripts/train_rl.py", "--steps", "2400"]
+    card = export_run(model, TINY_PPO, progress, file, command=command)
+    seen = observations()
+    np.save(tmp_path / "seen.npy", seen)
+    code = (
+        "import sys\n"
+        "sys.modules.update(dict.fromkeys(('torch', 'stable_baselines3', 'onnx')))\n"
+        "import numpy\n"
+        "from baselines.rl.onnx_policy import OnnxPolicy\n"
+        "answer = OnnxPolicy(sys.argv[1]).accelerations(numpy.load(sys.argv[2]))\n"
+        "numpy.save(sys.argv[3], answer)\n"
+    )
+    files = [file, tmp_path / "seen.npy", tmp_path / "answer.npy"]
+    subprocess.run([sys.executable, "-c", code, *files], check=True, cwd=ROOT)
+    answer = np.load(tmp_path / "answer.npy")
+    assert answer.dtype == np.float64
+    expected = policy_of(model, TINY_PPO.acceleration_scale)(seen)
+    assert np.ptp(expected) > 1e-3
+    np.testing.assert_allclose(answer, expected, rtol=0, atol=FLOAT32)
+
+    assert read_card(file) == json.loads(json.dumps(card))
+    assert (card["command"], card["steps"]) == (command, 2400)
+    assert TrainingSettings.of(card["settings"]) == TINY_PPO
+    assert all(len(values) == 10 for values in card["table1"].values())
+
+    again: dict[str, Any] = {"algorithm": "ppo", "command": ["again"]}
+    export_file(checkpoint, tmp_path / "again.onnx", **again)
+    np.testing.assert_array_equal(OnnxPolicy(tmp_path / "again.onnx").accelerations(seen), answer)
+    with pytest.raises(ValueError, match="A checkpoint knows its crane"):
+        export_file(checkpoint, file, crane=CraneParameters.field(), **again)
+
+
 def test_a_finished_run_is_not_trained_further(
     uninterrupted: tuple[Path, Any], tmp_path: Path
 ) -> None:
@@ -129,7 +180,7 @@ def test_a_finished_run_is_not_trained_further(
     again = tmp_path / "again"
     shutil.copytree(whole, again)
     model, progress = train(TINY_PPO, again)
-    assert progress.steps == 4800
+    assert progress.steps == 2400
     assert all(torch.equal(expected[name], tensor) for name, tensor in weights(model).items())
     assert (again / CURVE).read_bytes() == (whole / CURVE).read_bytes()
 
@@ -139,7 +190,7 @@ def test_the_logs_tell_the_validation_and_the_learners_own_numbers(
 ) -> None:
     folder, _ = uninterrupted
     curve = read_curve(folder / CURVE)
-    assert [row["steps"] for row in curve] == [0, 2400, 4800]
+    assert [row["steps"] for row in curve] == [0, 2400]
     assert all(row["stage_cost"] > 0.0 for row in curve)
     scalars = logged(folder)
     assert {"validation/IAE", "train/value_loss"} <= set(scalars)
@@ -148,7 +199,7 @@ def test_the_logs_tell_the_validation_and_the_learners_own_numbers(
 
 def test_sac_stopped_and_resumed_ends_bit_for_bit_as_one_that_was_not(tmp_path: Path) -> None:
     def stop(steps: int, _: Any) -> None:
-        if steps > 3000:
+        if steps > 1500:
             raise KilledError
 
     model, _ = train(TINY_SAC, tmp_path / "whole")
@@ -156,7 +207,7 @@ def test_sac_stopped_and_resumed_ends_bit_for_bit_as_one_that_was_not(tmp_path: 
     with pytest.raises(KilledError):
         train(TINY_SAC, tmp_path / "killed", on_progress=stop)
     resumed, progress = train(TINY_SAC, tmp_path / "killed")
-    assert progress.steps >= 4800
+    assert progress.steps >= 2400
     found = weights(resumed)
     assert all(torch.equal(expected[name], found[name]) for name in expected)
     assert without_time(tmp_path / "killed") == without_time(tmp_path / "whole")
@@ -187,6 +238,61 @@ def test_the_kept_policy_is_the_best_of_the_validation(uninterrupted: tuple[Path
         StageCost(),
     )
     assert again["stage_cost"].mean() == pytest.approx(best.stage_cost, rel=1e-9)
+
+
+def test_a_crane_that_diverges_costs_infinitely_and_leaves_the_others_validation_untouched(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def policy(observations: Any) -> Any:
+        seen = Observation(*observations.T)
+        return 2.0 * (seen.travel_reference - seen.trolley_velocity)[:, None]
+
+    def play(spoil: Any = None, policy: Any = policy) -> Any:
+        made = []
+
+        def make_and_keep(*arguments: Any, **settings: Any) -> Any:
+            made.append(gymnasium.make_vec(*arguments, max_episode_steps=400, **settings))
+            return made[0]
+
+        steps = iter(range(400))
+
+        def drive_and_spoil(observations: Any) -> Any:
+            if next(steps) == 150 and spoil is not None:
+                made[0].unwrapped.plant._velocity[1, 2] = 1e11
+            return policy(observations)
+
+        monkeypatch.setattr(validation, "gymnasium", SimpleNamespace(make_vec=make_and_keep))
+        return drive(drive_and_spoil, [VALIDATION] * 3, 7, CraneParameters(), StageCost())
+
+    def without_a_number(observations: Any) -> Any:
+        answers = policy(observations)
+        answers[1] = np.nan
+        return answers
+
+    whole = play()
+    assert np.isfinite(whole["stage_cost"]).all()
+    for broken in (play(spoil=True), play(policy=without_a_number)):
+        for name, values in broken.items():
+            assert values[1] == math.inf
+            np.testing.assert_array_equal(values[[0, 2]], whole[name][[0, 2]])
+
+
+def test_a_policy_that_failed_is_never_the_best_of_several(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    costs = iter([math.inf, 3.0, math.inf])
+    monkeypatch.setattr(
+        "baselines.rl.recorder.validate",
+        lambda *_, steps, **__: Validation(steps, 0.0, None, next(costs), 0.0, 0.0, 0.0),
+    )
+    recorder = Recorder(TINY_PPO, tmp_path, Progress(), lambda *_: None)
+    recorder.model = new_model(TINY_PPO)
+    kept = []
+    for bias in (1.0, 2.0, 3.0):
+        recorder.model.policy.value_net.bias.data.fill_(bias)
+        recorder._validate()
+        kept.append(recorder.progress.best["value_net.bias"].item())
+    assert kept == [1.0, 2.0, 2.0]
 
 
 def test_seeds_of_training_validation_and_test_never_meet() -> None:
@@ -307,16 +413,27 @@ def test_a_crane_at_rest_and_one_that_moves_as_asked_are_left_alone() -> None:
         ({"algorithm": "trpo"}, "Unknown algorithm 'trpo'; valid: ppo, sac, a2c, ddpg, td3"),
         ({"reward": "joy"}, "Unknown reward 'joy'; valid: stage-cost"),
         ({"steps": 0}, "steps must be a whole number of at least 1"),
+        ({"steps": 10**400}, "steps must be a whole number of at least 1 and below"),
         ({"seed": -1}, "seed must be a whole number of at least 0"),
-        ({"environments": 10**5}, "environments must be at most 10000"),
+        ({"seed": True}, "seed must be a whole number of at least 0"),
+        ({"environments": 10**5}, "environments must be a whole number .* below 10001"),
+        ({"environments": "5"}, "environments must be a whole number"),
+        ({"randomise": "no"}, "randomise must be True or False, not 'no'"),
+        ({"hyperparameters": [1]}, "hyperparameters must map the names"),
         ({"operator": "ghost"}, "ghost"),
-        ({"episode_steps": 0}, "episode_steps must be a whole number of at least 1"),
+        ({"acceleration_scale": math.nan}, "acceleration_scale must be a positive finite number"),
         ({"acceleration_scale": 9.0}, "at most the crane's 5.0 m/s"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         TrainingSettings(**settings)
+
+
+def test_numpys_numbers_are_settings() -> None:
+    settings = TrainingSettings(seed=np.int64(3), steps=np.uint8(9), acceleration_scale=np.int8(2))
+    assert settings == TrainingSettings(seed=3, steps=9, acceleration_scale=2.0)
+    assert json.dumps(settings.as_dict())
 
 
 def test_unknown_hyperparameters_are_refused() -> None:
