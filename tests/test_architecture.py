@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import re
 import subprocess
 import sys
@@ -50,6 +51,41 @@ def test_imports_point_from_scripts_to_baselines_to_crane_env(package: str) -> N
     for path in files(package):
         ours = {name.split(".")[0] for name in imports(path)} & {*PACKAGES, "tests"}
         assert ours <= ALLOWED[package], f"{path} imports {ours - ALLOWED[package]}"
+
+
+def room(module: str) -> str:
+    """The room of a package that a module is in, or the module itself if it is in none."""
+    return ".".join(module.split(".")[:2])
+
+
+def arrows() -> dict[str, set[str]]:
+    """Our modules and the modules of ours that each imports."""
+    modules = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for package in PACKAGES
+        for path in files(package)
+    }
+    return {
+        name: {found for found in imports(path) if found in modules and found not in PACKAGES}
+        for name, path in modules.items()
+        if name not in PACKAGES
+    }
+
+
+def test_no_two_modules_import_each_other_and_no_room_imports_one_above_it() -> None:
+    by_module = arrows()
+    tuple(graphlib.TopologicalSorter(by_module).static_order())  # raises on a circle
+    by_room: dict[str, set[str]] = {}
+    for module, imported in by_module.items():
+        by_room.setdefault(room(module), set()).update(map(room, imported))
+    inward = {name: others - {name} for name, others in by_room.items()}
+    tuple(graphlib.TopologicalSorter(inward).static_order())
+
+
+def test_a_room_holds_at_most_twelve_files() -> None:
+    for folder in {path.parent for package in PACKAGES for path in files(package)}:
+        names = [path.name for path in folder.glob("*.py") if path.name != "__init__.py"]
+        assert len(names) <= 12, f"{folder}: {len(names)} files"
 
 
 def test_only_the_plant_its_picture_and_its_benchmark_import_mujoco() -> None:
