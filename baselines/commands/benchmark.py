@@ -32,7 +32,7 @@ from rich.table import Table
 import crane_env
 from baselines import make_controller
 from baselines.commands.terminal import Job, check_writable, run, table_console
-from baselines.evaluation.worker_pool import available_cores
+from baselines.evaluation.workers import available_cores
 from baselines.mpc.controller import PredictiveController
 from baselines.mpc.ipopt_form import WARM_BARRIER, IpoptNmpc
 from baselines.mpc.linear import LinearMpc

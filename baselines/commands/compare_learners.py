@@ -287,7 +287,7 @@ def shift_section(options: Options, play: Play) -> list[str]:
     """Means on cranes and with operators that were not trained on."""
     rows = []
     for title, (operator, parameters) in DISTRIBUTION_SHIFTS.items():
-        setup = Setup(parameters=parameters)
+        setup = Setup(crane=parameters)
         seeds = range(options.shifted_manoeuvres)
         specs = episode_specs(options.controllers, [operator], seeds, setup)
         results = play(specs, title)

@@ -55,6 +55,8 @@ class Options:
             matter to the operators manoeuvre and random only.
         parameters: the crane: a preset (paper or field), or a JSON object, or a file with one, of
             the fields of CraneParameters that differ from the paper's.
+        nominal: the crane that the controllers believe in, likewise; None is the one that is
+            driven.
         settings: the optimal control problem of the predictive controllers: a JSON object, or a
             file with one, of the fields of MpcSettings that differ from the paper's.
         output: folder of the results. Episodes that it holds of the same options and the same code
@@ -68,6 +70,7 @@ class Options:
     operators: tuple[str, ...] = ("table1",)
     seeds: tuple[str, ...] = ("0",)
     parameters: str = "paper"
+    nominal: str | None = None
     settings: str = "{}"
     output: Path = Path("results/evaluate")
     jobs: int | None = None
@@ -90,7 +93,8 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     """
     jobs = processes(options.jobs)
     setup = Setup(
-        parameters=crane_parameters(options.parameters),
+        crane=crane_parameters(options.parameters, "parameters"),
+        nominal=None if options.nominal is None else crane_parameters(options.nominal, "nominal"),
         settings=MpcSettings.of(json_object(options.settings, "settings must be")),
         max_steps=options.max_steps,
     )
@@ -131,12 +135,12 @@ def evaluate(
     report(results, folder, drawn)
 
 
-def crane_parameters(given: str) -> CraneParameters:
+def crane_parameters(given: str, name: str) -> CraneParameters:
     """Reads a preset's name, a JSON object or a file with one."""
     if given in PRESETS:
         return CraneParameters.of(given)
     return CraneParameters.of(
-        json_object(given, f"parameters must be a preset ({', '.join(PRESETS)}),")
+        json_object(given, f"{name} must be a preset ({', '.join(PRESETS)}),")
     )
 
 

@@ -23,7 +23,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from baselines.evaluation.results import EpisodeResult
-from baselines.evaluation.worker_pool import available_cores
+from baselines.evaluation.workers import available_cores
 from crane_env.support.atomic_file import PARTIAL_SUFFIX
 from crane_env.support.extras import require
 

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from baselines.evaluation.episode_spec import EpisodeSpec, build_controller
 from baselines.evaluation.provenance import git_state, machine, package_versions
 from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
-from baselines.evaluation.worker import Task
-from baselines.evaluation.worker_pool import play_all
+from baselines.evaluation.workers import Task, play_all
 
 MANIFEST_FORMAT = "oilcrane-manifest-1"
 """Version of the manifest's layout."""
@@ -100,9 +99,7 @@ def compare(
             if (kept := folder.load_episode(spec, keep)) is not None:
                 finish(dataclasses.replace(kept, reused=True))
         tasks = [
-            Task(spec, spec.key, str(folder.path), keep)
-            for spec in specs
-            if spec.key not in results
+            Task(spec, spec.key, folder.path, keep) for spec in specs if spec.key not in results
         ]
         with closing(play_all(tasks, jobs)) as played:
             for result in played:

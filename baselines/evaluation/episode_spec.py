@@ -25,6 +25,7 @@ from baselines.registry import CONTROLLERS, make_controller, settings_type
 from crane_env import CraneParameters, Trajectory, run_episode
 from crane_env.controller import Controller
 from crane_env.operators.registry import FAMILIES, operator_program
+from crane_env.support.checks import whole
 from crane_env.support.factory import is_place
 
 
@@ -33,7 +34,8 @@ class Setup:
     """What all episodes of a comparison have in common.
 
     Attributes:
-        parameters: the crane, and the crane that the controllers believe in.
+        crane: the crane that is driven.
+        nominal: the crane that the controllers believe in; None: the one that is driven.
         settings: the controllers' optimal control problem; its cost is also the reward's.
         max_steps: end of the episode [control periods], if before the environment's own.
 
@@ -41,15 +43,22 @@ class Setup:
         ValueError: `max_steps` is no whole number of at least 1.
     """
 
-    parameters: CraneParameters = field(default_factory=CraneParameters)
+    crane: CraneParameters = field(default_factory=CraneParameters)
+    nominal: CraneParameters | None = None
     settings: MpcSettings = field(default_factory=MpcSettings)
     max_steps: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuses an episode without steps."""
-        steps = self.max_steps
-        if steps is not None and (type(steps) is not int or steps < 1):
-            raise ValueError(f"max_steps must be a whole number of at least 1, not {steps!r}.")
+        """Refuses an episode without steps; a belief that is right is no belief of its own."""
+        if self.nominal == self.crane:
+            object.__setattr__(self, "nominal", None)
+        if self.max_steps is not None:
+            object.__setattr__(self, "max_steps", whole("max_steps", self.max_steps, least=1))
+
+    @property
+    def believed(self) -> CraneParameters:
+        """The crane that the controllers are built for."""
+        return self.crane if self.nominal is None else self.nominal
 
     @functools.cached_property
     def key(self) -> str:
@@ -60,7 +69,8 @@ class Setup:
     def of(cls, mapping: Mapping[str, Any]) -> Setup:
         """Reads what `dataclasses.asdict` and JSON made of a setup."""
         return cls(
-            parameters=CraneParameters.of(mapping["parameters"]),
+            crane=CraneParameters.of(mapping["crane"]),
+            nominal=mapping["nominal"] and CraneParameters.of(mapping["nominal"]),
             settings=MpcSettings.of(mapping["settings"]),
             max_steps=mapping["max_steps"],
         )
@@ -146,7 +156,7 @@ def play(spec: EpisodeSpec) -> Trajectory:
     env = gymnasium.make(
         "OILCrane-v0",
         operator=spec.operator,
-        parameters=setup.parameters,
+        parameters=setup.crane,
         cost=setup.settings.cost,
     )
     try:
@@ -165,7 +175,7 @@ def build_controller(spec: EpisodeSpec) -> Controller:
     """
     name, setup = spec.controller, spec.setup
     settings = setup.settings if settings_type(name) is MpcSettings else None
-    return make_controller(name, parameters=setup.parameters, settings=settings)
+    return make_controller(name, parameters=setup.believed, settings=settings)
 
 
 @functools.cache

@@ -119,7 +119,7 @@ def assumption_b_needs_nmpc(evidence: Evidence) -> Finding:
 
 def horizon_is_one_second(evidence: Evidence) -> Finding:
     """The prediction horizon lasts 1 s."""
-    settings, crane = evidence.setup.settings, evidence.setup.parameters
+    settings, crane = evidence.setup.settings, evidence.setup.crane
     horizon = settings.prediction_horizon * crane.control_period
     return Finding(
         math.isclose(horizon, HORIZON_SAID),
@@ -139,7 +139,7 @@ def comparable(index: str) -> Callable[[Evidence], Finding]:
 
 def acceleration_keeps_its_limit(evidence: Evidence) -> Finding:
     """No MPC asks for more acceleration than allowed."""
-    crane = evidence.setup.parameters
+    crane = evidence.setup.crane
     low, high = evidence.setup.settings.acceleration_range(crane)
     peak = float(evidence.stack(PAPER_MPCS, "peak_acceleration").max())
     limit = min(-low, high)
@@ -233,7 +233,7 @@ def nmpc_takes_longer(evidence: Evidence) -> Finding:
     median = {name: float(own["act_median"].mean()) for name, own in evidence.timed.items()}
     p99 = {name: float(own["act_p99"].mean()) for name, own in evidence.timed.items()}
     ratios = {name: median[name] / median["adaptive"] for name in median}
-    period = evidence.setup.parameters.control_period
+    period = evidence.setup.crane.control_period
     return Finding(
         ratios["nmpc-a"] > 1.0 and ratios["nmpc-b"] > 1.0,
         f"median {1e6 * median['adaptive']:.0f} µs of adaptive; "

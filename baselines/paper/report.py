@@ -238,7 +238,7 @@ def _sensitivity_part(reproduction: Reproduction) -> list[str]:
 
 
 def _timing_part(evidence: Evidence) -> list[str]:
-    period = evidence.setup.parameters.control_period
+    period = evidence.setup.crane.control_period
     reference = float(evidence.timed["adaptive"]["act_median"].mean())
     rows = (
         (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -62,7 +61,7 @@ class Variation:
             crane |= change.crane
             settings |= change.settings
         return Setup(
-            parameters=dataclasses.replace(CraneParameters(), **crane),
+            crane=CraneParameters(**crane),
             settings=MpcSettings(**settings),
         )
 

@@ -55,6 +55,14 @@ class Dying(Stub):
             os.kill(os.getpid(), signal.SIGSEGV)
 
 
+class Hanging(Stub):
+    """Never answers once the operator travels."""
+
+    def before_act(self, observation: NDArray[np.float64]) -> None:
+        while observation[6] != 0.0:
+            time.sleep(1.0)
+
+
 class Chatty(Stub):
     """Writes to standard output, past Python too, as solvers do."""
 
@@ -80,6 +88,10 @@ def raising(crane: CraneParameters, settings: MpcSettings) -> Raising:
 
 def dying(crane: CraneParameters, settings: MpcSettings) -> Dying:
     return Dying()
+
+
+def hanging(crane: CraneParameters) -> Hanging:
+    return Hanging()
 
 
 def chatty(crane: CraneParameters, settings: MpcSettings) -> Chatty:

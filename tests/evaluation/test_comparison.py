@@ -19,7 +19,7 @@ from baselines.evaluation.comparison import check_controllers, compare, index_va
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs, play
 from baselines.evaluation.results import PARTIAL_AGE, EpisodeResult, ResultsFolder
 from baselines.evaluation.tables import lowest, mean_and_deviation
-from baselines.evaluation.worker import Task
+from baselines.evaluation.workers import Task, play_all
 from baselines.mpc.settings import MpcSettings
 from crane_env import CraneParameters, Trajectory
 from crane_env.operators.registry import operator_program
@@ -94,7 +94,8 @@ def test_episodes_of_another_setup_are_kept_apart(tmp_path: Path) -> None:
     setups = [
         SHORT,
         Setup(max_steps=119),
-        Setup(max_steps=120, parameters=CraneParameters(payload_mass=150.0)),
+        Setup(max_steps=120, crane=CraneParameters(payload_mass=150.0)),
+        Setup(max_steps=120, nominal=CraneParameters(payload_mass=150.0)),
         Setup(max_steps=120, settings=MpcSettings(control_horizon=11)),
     ]
     each = [episode_specs(["manual"], ["table1:1"], [0], setup) for setup in setups]
@@ -105,8 +106,8 @@ def test_episodes_of_another_setup_are_kept_apart(tmp_path: Path) -> None:
     homes = [folder.record_file(spec).parent for (spec,) in each]
     assert len(set(homes)) == len(setups)
     assert folder.other_setups(each[0]) == sorted(homes[1:])
-    assert len(folder.read_metrics()) == len(folder.read_manifest()["episodes"]) == 3
-    assert [len(folder.trajectory(spec)) for (spec,) in each] == [120, 119, 120, 120]
+    assert len(folder.read_metrics()) == len(folder.read_manifest()["episodes"]) == 4
+    assert [len(folder.trajectory(spec)) for (spec,) in each] == [120, 119, 120, 120, 120]
     assert folder.trajectory(each[2][0]).parameters.payload_mass == 150.0
 
 
@@ -147,21 +148,21 @@ def test_the_code_identity_changes_with_every_file_and_every_computing_package(
 
 def test_a_setup_and_a_specification_survive_json_with_their_keys() -> None:
     setup = Setup(
-        parameters=CraneParameters.field(),
+        crane=CraneParameters.field(),
+        nominal=CraneParameters(),
         settings=MpcSettings(acceleration_limits=(-0.2, 0.3), control_horizon=5),
         max_steps=7,
     )
     for spec in episode_specs(["linear"], ["random", "table1:2", "manoeuvre"], [3], setup):
-        task = Task(spec, spec.key, "folder", "metrics")
-        again = Task.of_line(task.to_line())
-        assert again == task
-        assert again.spec.key == spec.key
-        assert again.spec.setup.key == setup.key
+        again = EpisodeSpec.of(json.loads(json.dumps(dataclasses.asdict(spec))))
+        assert again == spec
+        assert again.key == spec.key
+        assert again.setup.key == setup.key
 
 
 def test_an_operator_of_ones_own_is_played_and_its_code_is_in_the_key() -> None:
     (spec,) = specs_of("manual", operators=("tests.operators.test_operators:EverySecond",))
-    again = Task.of_line(Task(spec, spec.key, "folder", "metrics").to_line()).spec
+    again = EpisodeSpec.of(json.loads(json.dumps(dataclasses.asdict(spec))))
     assert again == spec
     assert play(again).travel_reference.any()
     assert baselines.evaluation.episode_spec.factory_identity(spec.operator_name)
@@ -221,6 +222,15 @@ def test_a_worker_that_dies_fails_its_episode_alone(tmp_path: Path) -> None:
     results = compare(specs, ResultsFolder(tmp_path), jobs=1)
     assert [result.status for result in results] == ["failed", "failed", *["finished"] * 4]
     assert "SIGSEGV" in results[0].failure
+
+
+def test_a_worker_that_hangs_fails_its_episode_alone(tmp_path: Path) -> None:
+    specs = specs_of("manual", f"{STUBS}:hanging")
+    tasks = [Task(spec, spec.key, tmp_path, "metrics") for spec in specs]
+    played = play_all(tasks, 2, episode_time_max=15.0)
+    failures = {result.spec.controller: result.failure for result in played}
+    assert failures["manual"] == ""
+    assert "took longer than 15 s" in failures[f"{STUBS}:hanging"]
 
 
 def test_what_a_controller_prints_does_no_harm(tmp_path: Path) -> None:
@@ -298,7 +308,7 @@ def test_the_table_of_metrics_is_what_the_trajectories_say(tmp_path: Path) -> No
 
 def test_the_manifest_says_what_is_needed_to_play_it_all_again(tmp_path: Path) -> None:
     folder = ResultsFolder(tmp_path)
-    setup = Setup(parameters=CraneParameters(payload_mass=150.0), max_steps=5)
+    setup = Setup(crane=CraneParameters(payload_mass=150.0), max_steps=5)
     specs = episode_specs(["manual"], ["random"], [4, 5], setup)
     compare(specs, folder, jobs=1, command=["evaluate.py", "--jobs", "1"])
 
@@ -379,6 +389,19 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     occupied.touch()
     with pytest.raises(OSError, match=r"output folder '.*file' cannot be written: Not a directory"):
         ResultsFolder(occupied).prepare()
+
+
+def test_a_controller_may_believe_in_another_crane_than_it_drives() -> None:
+    crane, believed = CraneParameters(), CraneParameters(gravity=1.0)
+    told = Setup(max_steps=400, crane=crane, nominal=crane)
+    assert told == Setup(max_steps=400)
+    misled = dataclasses.replace(told, nominal=believed)
+    right, wrong = (
+        play(*episode_specs(["adaptive"], ["table1:1"], [0], setup)) for setup in (told, misled)
+    )
+    assert right.parameters == wrong.parameters == crane
+    assert right.metrics().IAE < wrong.metrics().IAE
+    assert (right.action != wrong.action).any()
 
 
 def test_nonsense_is_refused_with_what_is_allowed() -> None:

@@ -150,7 +150,7 @@ def test_a_variation_differs_from_the_defaults_in_what_it_says(variation: Variat
     default, varied = Setup(), variation.setup
     differing = {
         field.name
-        for part in ("parameters", "settings")
+        for part in ("crane", "settings")
         for field in dataclasses.fields(getattr(default, part))
         if getattr(getattr(default, part), field.name) != getattr(getattr(varied, part), field.name)
     }

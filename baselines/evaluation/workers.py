@@ -1,0 +1,175 @@
+"""Workers: processes that play episodes side by side, and what happens in one stays in it.
+
+The pool is pebble's: a process that dies (a solver's crash, lack of memory) or hangs costs the
+episode that it was playing and no other. The pool of loky, its nearest peer, gives up all episodes
+at the first death. Workers are spawned, not forked: they share nothing with this process. Ctrl-C
+reaches this process alone, which then stops them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import multiprocessing
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from concurrent.futures import as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import baselines
+import crane_env
+from baselines.evaluation.episode_spec import EpisodeSpec, play
+from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
+from crane_env.support.extras import require
+
+ONE_THREAD = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMBA_NUM_THREADS",
+    ),
+    "1",
+)
+"""Environment of a worker: as many workers as cores, so one thread each."""
+
+EPISODE_TIME_MAX = 3600.0
+"""An episode that takes longer hangs [s]; the slowest solver here needs four minutes."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """An episode to be played and kept.
+
+    Attributes:
+        spec: the episode.
+        key: its key as the parent knows it; another one here means that the code has changed.
+        folder: path of the results folder.
+        keep: what is kept of it.
+    """
+
+    spec: EpisodeSpec
+    key: str
+    folder: Path
+    keep: Keep
+
+
+def available_cores() -> int:
+    """Processor cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def play_all(
+    tasks: Sequence[Task], jobs: int, episode_time_max: float = EPISODE_TIME_MAX
+) -> Generator[EpisodeResult, None, None]:
+    """Plays and keeps episodes; gives their results in the order in which they end.
+
+    Closing the generator, or an exception in it such as KeyboardInterrupt, stops the workers; the
+    episodes that they were playing leave nothing behind.
+
+    Args:
+        tasks: the episodes.
+        jobs: number of processes, at least 1.
+        episode_time_max: an episode that takes longer fails [s].
+
+    Raises:
+        ImportError: pebble is missing; the message names the extra.
+    """
+    pebble = require("pebble", extra="results")
+    with environment(ONE_THREAD):
+        pool = pebble.ProcessPool(
+            max_workers=max(1, min(jobs, len(tasks))),
+            initializer=prepare,
+            initargs=(import_paths(),),
+            context=multiprocessing.get_context("spawn"),
+        )
+        try:
+            waiting = {
+                pool.schedule(perform, args=(task,), timeout=episode_time_max): task.spec
+                for task in tasks
+            }
+            for future in as_completed(waiting):
+                spec = waiting[future]
+                try:
+                    yield future.result()
+                except TimeoutError:
+                    hung = f"The episode took longer than {episode_time_max:g} s and was ended."
+                    yield EpisodeResult(spec, None, episode_time_max, failure=hung)
+                except pebble.ProcessExpired as expired:
+                    yield EpisodeResult(spec, None, 0.0, failure=obituary(expired.exitcode))
+        finally:
+            pool.stop()
+            pool.join()
+
+
+def perform(task: Task) -> EpisodeResult:
+    """Plays and keeps an episode; whatever it raises is the result."""
+    start = perf_counter()
+    try:
+        # A fresh specification: the key that came with this one is the parent's.
+        own = dataclasses.replace(task.spec, setup=dataclasses.replace(task.spec.setup))
+        if own.key != task.key:
+            raise RuntimeError("the code changed while the comparison was running")
+        trajectory = play(task.spec)
+        wall_time = perf_counter() - start
+        metrics = ResultsFolder(task.folder).save_episode(
+            task.spec, trajectory, wall_time, task.keep
+        )
+    except (Exception, SystemExit) as error:  # a result, not the end of the comparison
+        return EpisodeResult(
+            task.spec,
+            None,
+            perf_counter() - start,
+            failure=f"{type(error).__name__}: {error}",
+            traceback=traceback.format_exc(),
+        )
+    return EpisodeResult(task.spec, metrics, wall_time)
+
+
+def prepare(paths: Sequence[str]) -> None:
+    """Makes a fresh process a worker: the parent's modules, its own silence, no Ctrl-C.
+
+    Args:
+        paths: where modules are found.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.path[:] = paths
+    if sys.stdout and sys.stderr:  # solvers print to standard output, which is the parent's own
+        os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+
+
+@contextmanager
+def environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """Sets environment variables, which processes started meanwhile inherit."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def import_paths() -> list[str]:
+    """Where a worker finds modules: this process's own packages first, then as this process."""
+    own = [str(Path(str(package.__file__)).parents[1]) for package in (baselines, crane_env)]
+    return list(dict.fromkeys([*own, *(path or str(Path.cwd()) for path in sys.path)]))
+
+
+def obituary(exit_code: Any) -> str:
+    """Why a worker died."""
+    code = int(exit_code or 0)
+    ended = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+    return f"The worker process ended {ended}."
