@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, NoReturn
 
 import baselines
 import crane_env
@@ -59,6 +59,12 @@ class Task:
     key: str
     folder: Path
     keep: Keep
+
+
+class StoppedError(SystemExit):
+    """The pool stops this worker; files half written go on the way out."""
+
+    code: int
 
 
 def available_cores() -> int:
@@ -124,6 +130,8 @@ def perform(task: Task) -> EpisodeResult:
         metrics = ResultsFolder(task.folder).save_episode(
             task.spec, trajectory, wall_time, task.keep
         )
+    except StoppedError as stopped:
+        os._exit(stopped.code)
     except (Exception, SystemExit) as error:  # a result, not the end of the comparison
         return EpisodeResult(
             task.spec,
@@ -136,15 +144,20 @@ def perform(task: Task) -> EpisodeResult:
 
 
 def prepare(paths: Sequence[str]) -> None:
-    """Makes a fresh process a worker: the parent's modules, its own silence, no Ctrl-C.
+    """Makes a fresh process a worker: the parent's modules, no output, an end in order.
 
     Args:
         paths: where modules are found.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, leave)
     sys.path[:] = paths
     if sys.stdout and sys.stderr:  # solvers print to standard output, which is the parent's own
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+
+
+def leave(signal_number: int, _: Any) -> NoReturn:
+    """Ends a worker in order, wherever it is."""
+    raise StoppedError(128 + signal_number)
 
 
 @contextmanager
