@@ -81,7 +81,7 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
         if not options.export.is_file():
             raise FileNotFoundError(f"There is no model {str(options.export)!r}.")
         given = options.parameters
-        crane = None if given is None else crane_parameters(given)
+        crane = None if given is None else crane_parameters(given, "parameters")
         return functools.partial(export, options.export, options, crane, command)
     if options.parameters is not None or options.statistics is not None:
         raise ValueError("parameters and statistics belong to --export.")
