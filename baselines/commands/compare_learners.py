@@ -32,7 +32,7 @@ from baselines.commands.terminal import (
 )
 from baselines.evaluation.comparison import check_controllers, compare
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
-from baselines.evaluation.learning_figure import draw_learning
+from baselines.evaluation.figures import learning_figure, save_figure
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.statistics import paired_difference
 from baselines.rl.onnx_policy import table1_means
@@ -185,7 +185,7 @@ def training_sections(options: Options) -> list[str]:
         + [""]
     )
     figure = options.report.parent / "rl_learning_curves.png"
-    draw_learning(runs, validation_reference(), figure)
+    save_figure(learning_figure(runs, validation_reference()), figure)
     headings = ["algorithm", "seed", "steps", "minutes", "IAE [m]", "release drift [m]"]
     headings += ["stage cost [m²/s]", "beats adaptive on both"]
     return [

@@ -1,4 +1,5 @@
-"""Figures of a comparison: the paper's Figs. 3 to 7, redrawn from trajectories and metrics.
+"""Figures of a comparison: the paper's Figs. 3 to 7, redrawn from trajectories and metrics, and
+how learned controllers came to theirs.
 
 Every function takes what it draws and returns a new matplotlib `Figure`; none touches a file, a
 screen or matplotlib's global state. A controller has the same colour in all of them.
@@ -55,6 +56,14 @@ LABEL_ROOM = 0.03
 """Room that the label of an instant takes, as a share of the time axis."""
 MOST_LABELLED_BARS = 40
 """So many bars have their value written on them."""
+LEARNING = {
+    "stage_cost": "Stage cost [m²/s]",
+    "IAE": "IAE [m]",
+    "release_drift": "Release drift [m]",
+}
+"""Indices of the learning figure and their labels."""
+LEARNING_CEILING = 2.0
+"""Its axes end at so many times the reference: before it, nothing has been learned."""
 
 
 def controller_colours(controllers: Iterable[str]) -> dict[str, str]:
@@ -223,6 +232,37 @@ def index_figure(
     axes.grid(visible=False, axis="x")
     axes.set_xlim(-0.6, len(operators) - 0.4)
     _legend(figure, *axes.get_legend_handles_labels(), "outside lower center")
+    return figure
+
+
+def learning_figure(
+    runs: Mapping[str, Sequence[Sequence[Mapping[str, float]]]], reference: Mapping[str, float]
+) -> Figure:
+    """How the validation indices fell with training: median and range over the seeds.
+
+    Args:
+        runs: algorithm to the learning curves of its seeds: rows with `steps` and the indices, at
+            the same steps in each.
+        reference: what the adaptive MPC reaches on the same manoeuvres, by index.
+    """
+    figure: Figure = require("matplotlib.figure", extra="results").Figure(
+        figsize=(11.0, 3.4), layout="constrained"
+    )
+    panels = figure.subplots(1, len(LEARNING))
+    for axes, (index, label) in zip(panels, LEARNING.items(), strict=True):
+        for algorithm, curves in runs.items():
+            steps = np.array([row["steps"] for row in curves[0]]) / 1e6
+            values = np.array([[row[index] for row in curve] for curve in curves])
+            (line,) = axes.plot(
+                steps, np.median(values, axis=0), label=f"{algorithm}, {len(curves)} seed(s)"
+            )
+            lowest, highest = values.min(axis=0), values.max(axis=0)
+            axes.fill_between(steps, lowest, highest, color=line.get_color(), alpha=0.25)
+        axes.axhline(reference[index], color="black", linestyle="--", label="adaptive MPC")
+        limits = (0.8 * reference[index], LEARNING_CEILING * reference[index])
+        axes.set(xlabel="Environment steps [million]", ylabel=label, ylim=limits)
+        axes.grid(alpha=0.3)
+    panels[0].legend()
     return figure
 
 

@@ -10,9 +10,8 @@ from baselines.evaluation.provenance import machine, package_versions
 from baselines.paper.checks import percent
 from baselines.paper.claims import NOT_CHECKABLE
 from baselines.paper.evidence import Evidence, plain
-from baselines.paper.repeat import CONFIDENCE, Pair
 from baselines.paper.stages import CONTROLLERS, PREDICTIVE, Reproduction
-from baselines.paper.verdicts import Judgement
+from baselines.paper.verdicts import CONFIDENCE, Judgement, Pair
 from crane_env.support.extras import require
 
 if TYPE_CHECKING:

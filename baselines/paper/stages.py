@@ -20,9 +20,8 @@ from baselines.evaluation.episode_spec import EpisodeSpec, Setup
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.mpc.settings import MpcSettings
 from baselines.paper.evidence import Evidence, Indices, measured_indices, steady_manoeuvre
-from baselines.paper.repeat import Pair, Share, claim_shares, paired_comparisons
 from baselines.paper.sensitivity import Variation
-from baselines.paper.verdicts import Judgement, judge
+from baselines.paper.verdicts import Judgement, Pair, Share, claim_shares, judge, paired_comparisons
 from crane_env.operators.registry import operator_program
 from crane_env.operators.table1 import TABLE_1
 

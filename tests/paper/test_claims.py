@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from baselines.evaluation.episode_spec import Setup
 from baselines.mpc.settings import MpcSettings
 from baselines.paper.claims import CLAIMS, NOT_CHECKABLE, Claim
-from baselines.paper.evidence import Evidence
-from baselines.paper.oscillation import short_cable_oscillation, turning_points
+from baselines.paper.evidence import Evidence, short_cable_oscillation, turning_points
 from crane_env import Trajectory
 from tests.episode.made_up import made_up_trajectory
 from tests.paper.paper_evidence import COUNT, agreeing_evidence, scaled

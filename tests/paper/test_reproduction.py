@@ -21,9 +21,7 @@ from baselines.evaluation.episode_spec import Setup
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.paper.checks import Finding
 from baselines.paper.claims import CLAIMS, NOT_CHECKABLE
-from baselines.paper.evidence import measured_indices, steady_manoeuvre
-from baselines.paper.oscillation import short_cable_oscillation
-from baselines.paper.repeat import COMPARED, PAIRS, claim_shares, paired_comparisons
+from baselines.paper.evidence import measured_indices, short_cable_oscillation, steady_manoeuvre
 from baselines.paper.report import (
     markdown_report,
     pair_summary,
@@ -52,7 +50,7 @@ from baselines.paper.stages import (
     table_specs,
     timing_stage,
 )
-from baselines.paper.verdicts import Judgement
+from baselines.paper.verdicts import COMPARED, PAIRS, Judgement, claim_shares, paired_comparisons
 from crane_env import make_operator
 from crane_env.operators.table1 import TABLE_1
 from tests.paper.paper_evidence import agreeing_evidence, scaled
