@@ -35,6 +35,7 @@ from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.figures import learning_figure, save_figure
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.statistics import paired_difference
+from baselines.evaluation.tables import markdown_table
 from baselines.rl.onnx_policy import table1_means
 from baselines.rl.validation import VALIDATION, VALIDATION_SEEDS, drive
 from crane_env import CraneParameters
@@ -196,7 +197,7 @@ def training_sections(options: Options) -> list[str]:
         "Means over Table I of the policy that did best on the validation manoeuvres of its own "
         "run; minutes of wall time, evaluations included.",
         "",
-        *markdown_table(headings, rows),
+        markdown_table(headings, rows),
         "",
     ]
 
@@ -240,12 +241,12 @@ def table1_section(options: Options, play: Play) -> list[str]:
     return [
         "## Table I",
         "",
-        *markdown_table(headings, index_rows(options.controllers, results)),
+        markdown_table(headings, index_rows(options.controllers, results)),
         "",
         "Time of one answer, medians over the ten episodes; policies through onnxruntime on one "
         "thread.",
         "",
-        *markdown_table(["controller", "median [µs]", "99th percentile [µs]"], times),
+        markdown_table(["controller", "median [µs]", "99th percentile [µs]"], times),
         "",
     ]
 
@@ -260,12 +261,12 @@ def unseen_section(options: Options, play: Play) -> list[str]:
     return [
         f"## {options.manoeuvres} unseen manoeuvres",
         "",
-        *markdown_table(headings, index_rows(options.controllers, results)),
+        markdown_table(headings, index_rows(options.controllers, results)),
         "",
         f"Differences from {REFERENCE}, manoeuvre by manoeuvre: mean with its 95 % confidence "
         "interval, and the share of manoeuvres in which the controller is the better one.",
         "",
-        *markdown_table(
+        markdown_table(
             ["controller", "IAE [m]", "better", "release drift [m]", "better"],
             [
                 [
@@ -307,7 +308,7 @@ def shift_section(options: Options, play: Play) -> list[str]:
         f"Mean IAE [m] / stage cost [m²/s] over {options.shifted_manoeuvres} episodes each. The "
         "MPCs are told the crane's parameters; the policies are not.",
         "",
-        *markdown_table(["crane and operator", *options.controllers], rows),
+        markdown_table(["crane and operator", *options.controllers], rows),
         "",
     ]
 
@@ -368,9 +369,3 @@ def difference_cells(results: Sequence[EpisodeResult], name: str, index: str) ->
     low, high = difference.interval
     share = 100.0 * difference.lower / difference.count
     return f"{difference.mean:+.4f} ({low:+.4f} to {high:+.4f})", f"{share:.0f} %"
-
-
-def markdown_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Lines of a Markdown table."""
-    lines = [headings, ["---"] * len(headings), *rows]
-    return ["| " + " | ".join(line) + " |" for line in lines]

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from baselines.commands.terminal import Job, run
 from baselines.evaluation.figures import save_figure
+from baselines.evaluation.tables import markdown_table
 from baselines.mpc.cost_table import first_move_errors
 from baselines.mpc.linear import CostModel, adaptive_cost, time_varying_cost
 from baselines.mpc.prediction.cable import hoist_stop_time
@@ -132,7 +133,7 @@ def measure(
 
 def markdown(measurements: Sequence[Measurement], heads: Sequence[str]) -> str:
     """Measurements as a Markdown table: the grid, kB, then worst and median of each part."""
-    lines = [" | ".join(heads), " | ".join("---" for _ in heads)]
+    rows = []
     for row in measurements:
         errors = (e for pair in zip(row.worst, row.median, strict=True) for e in pair)
         *nodes, interpolation = astuple(row.grid)
@@ -142,8 +143,8 @@ def markdown(measurements: Sequence[Measurement], heads: Sequence[str]) -> str:
             f"{row.memory / 1000:.0f}",
             *(f"{error:.1e}" for error in errors),
         ]
-        lines.append(" | ".join(cells))
-    return "\n".join(f"| {line} |" for line in lines)
+        rows.append(cells)
+    return markdown_table(heads, rows)
 
 
 def error_figure(tabulated: Sequence[Measurement], tabulated_ltv: Sequence[Measurement]) -> Figure:

@@ -1,5 +1,4 @@
-"""Figures of a comparison: the paper's Figs. 3 to 7, redrawn from trajectories and metrics, and
-how learned controllers came to theirs.
+"""Figures of a comparison: the paper's Figs. 3 to 7, redrawn, and how learning went.
 
 Every function takes what it draws and returns a new matplotlib `Figure`; none touches a file, a
 screen or matplotlib's global state. A controller has the same colour in all of them.

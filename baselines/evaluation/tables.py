@@ -1,9 +1,9 @@
-"""Tables of a comparison for the terminal: one a controller, one an operator with its winner."""
+"""Tables: a comparison by controller and by operator for the terminal, and any in Markdown."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -104,6 +104,14 @@ def operator_table(results: Sequence[EpisodeResult], index: str, title: str) -> 
     table.add_section()
     table.add_row("wins", *map(str, wins.values()))
     return table
+
+
+def markdown_table(head: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
+    """A table in Markdown, each cell as it is written."""
+    cells = [[str(cell).replace("|", "\\|") for cell in row] for row in (head, *rows)]
+    tabulate = require("tabulate", extra="results").tabulate
+    written: str = tabulate(cells[1:], cells[0], tablefmt="github", disable_numparse=True)
+    return written
 
 
 def lowest(values: Mapping[str, float]) -> set[str]:

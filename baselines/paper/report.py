@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from baselines.evaluation.provenance import machine, package_versions
+from baselines.evaluation.tables import markdown_table
 from baselines.paper.checks import percent
 from baselines.paper.claims import NOT_CHECKABLE
 from baselines.paper.evidence import Evidence, plain
@@ -50,7 +51,7 @@ def markdown_report(reproduction: Reproduction) -> str:
         REVISIONS,
         definition_table(judgements),
         "## What cannot be checked here",
-        _table(
+        markdown_table(
             ("section", "statement", "why not, and what can be said"),
             ((u.section, quoted(u.statement), u.reason) for u in NOT_CHECKABLE),
         ),
@@ -78,7 +79,9 @@ def verdict_table(judgements: Iterable[Judgement]) -> str:
         )
         for number, judgement in enumerate(judgements, start=1)
     )
-    return _table(("", "section", "the paper says", "measured on the defaults", "verdict"), rows)
+    return markdown_table(
+        ("", "section", "the paper says", "measured on the defaults", "verdict"), rows
+    )
 
 
 def definition_table(judgements: Iterable[Judgement]) -> str:
@@ -87,7 +90,7 @@ def definition_table(judgements: Iterable[Judgement]) -> str:
         (number, f"`{judgement.claim.name}`", judgement.claim.definition)
         for number, judgement in enumerate(judgements, start=1)
     )
-    return _table(("", "claim", "counts as true if"), rows)
+    return markdown_table(("", "claim", "counts as true if"), rows)
 
 
 def manoeuvre_table(evidence: Evidence, index: str) -> str:
@@ -98,7 +101,7 @@ def manoeuvre_table(evidence: Evidence, index: str) -> str:
         for number, column in enumerate(values.T, start=1)
     ]
     rows.append(("mean", *(f"{mean:.3f}" for mean in values.mean(axis=1))))
-    return _table((f"{NAMES[index]} [m]", *CONTROLLERS), rows)
+    return markdown_table((f"{NAMES[index]} [m]", *CONTROLLERS), rows)
 
 
 def verdict_words(judgement: Judgement) -> str:
@@ -194,9 +197,9 @@ def _repeat_part(reproduction: Reproduction) -> list[str]:
         f"{count} manoeuvres of the paper's family (`crane_env/operators/manoeuvre.py`), seeds 0 "
         f"to {count - 1}, on the default setup. Differences are taken manoeuvre by manoeuvre; the "
         f"intervals ({percent(CONFIDENCE)}, BCa bootstrap) are of the mean difference.",
-        _table(PAIR_HEAD, map(pair_row, reproduction.pairs)),
+        markdown_table(PAIR_HEAD, map(pair_row, reproduction.pairs)),
         f"In how many of them each claim is met, with Wilson's {percent(CONFIDENCE)} interval:",
-        _table(("claim", "met in", "share", "measured"), shares),
+        markdown_table(("claim", "met in", "share", "measured"), shares),
     ]
 
 
@@ -223,9 +226,9 @@ def _sensitivity_part(reproduction: Reproduction) -> list[str]:
     return [
         f"Table I again under {len(names)} other readings of what the paper leaves open. Whether "
         "each claim (by its number above) holds; bold where the answer differs from the defaults':",
-        _table(("variation", *(number for number, _ in judged), "hold"), verdicts),
+        markdown_table(("variation", *(number for number, _ in judged), "hold"), verdicts),
         "Means over the ten manoeuvres [m]:",
-        _table(
+        markdown_table(
             (
                 "variation",
                 *(f"IAE {name}" for name in PREDICTIVE),
@@ -253,7 +256,7 @@ def _timing_part(evidence: Evidence) -> list[str]:
         "Manoeuvre 1 of Table I, one episode at a time, by the wall clock, on "
         f"{host['processor'] or host['architecture']} ({host['cores']} cores) with Python "
         f"{host['python']}. `nmpc-b-ipopt` is the same problem as `nmpc-b`, solved by IPOPT.",
-        _table(
+        markdown_table(
             (
                 "controller",
                 "median [ms]",
@@ -278,14 +281,6 @@ def _evidence_dict(evidence: Evidence) -> dict[str, Any]:
 
 def _holds(holds: bool) -> str:
     return "yes" if holds else "no"
-
-
-def _table(head: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
-    """A table in Markdown."""
-    cells = [[str(cell).replace("|", "\\|") for cell in row] for row in (head, *rows)]
-    lines = [f"| {' | '.join(row)} |" for row in cells]
-    lines.insert(1, "|" + "---|" * len(cells[0]))
-    return "\n".join(lines)
 
 
 def _terminal_table(title: str, head: Iterable[str]) -> Table:

@@ -26,7 +26,7 @@ def test_the_report_keeps_its_text_and_has_the_indices_of_every_controller(tmp_p
     assert text.startswith("# Findings\n\nWritten by hand.")
     assert "stale rows" not in text.partition(MARKER)[2]
     for name in ("adaptive", "ppo"):
-        found = re.search(rf"^\| {name} \| ([\d.]+) \| ([\d.]+) \|", text, re.MULTILINE)
+        found = re.search(rf"^\| {name} +\| ([\d.]+) +\| ([\d.]+) +\|", text, re.MULTILINE)
         assert found is not None
         indices = []
         for number in range(1, 11):
