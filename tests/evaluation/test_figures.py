@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -21,18 +20,16 @@ from baselines.evaluation.figures import (
     COLOURS,
     RESOLUTION,
     WIDTH,
-    acceleration_figure,
     controller_colours,
     index_figure,
     reference_figure,
     save_figure,
     velocity_figure,
 )
-from baselines.evaluation.gallery import draw_gallery, table_1_instants
+from baselines.evaluation.gallery import draw_gallery
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.registry import CONTROLLERS
 from crane_env import Trajectory
-from crane_env.operators.table1 import TABLE_1
 
 
 @pytest.fixture(scope="module")
@@ -70,18 +67,6 @@ def test_fig_3_draws_cable_length_and_travel_reference_with_the_instants(
     assert figure.get_suptitle() == "title"
 
 
-@pytest.mark.parametrize("number", range(1, len(TABLE_1) + 1))
-def test_fig_3_labels_no_two_instants_on_top_of_each_other(number: int) -> None:
-    (spec,) = episode_specs(["manual"], ["table1:1"], [0], Setup(max_steps=2))
-    trajectory = play(spec)
-    trajectory.time[-1] = 25.0  # the axis of a whole episode
-    figure = reference_figure(trajectory, "title", table_1_instants(f"table1:{number}"))
-    figure.canvas.draw()
-    boxes = [text.get_window_extent() for text in figure.axes[0].texts]
-    assert len(boxes) == 4
-    assert not [1 for one, other in itertools.combinations(boxes, 2) if one.overlaps(other)]
-
-
 def test_fig_4_draws_reference_and_payload_velocity_of_each_controller(
     trajectories: Mapping[str, Trajectory],
 ) -> None:
@@ -95,37 +80,6 @@ def test_fig_4_draws_reference_and_payload_velocity_of_each_controller(
         assert to_hex(velocity.get_color()) == colours[name]
     assert figure.get_supylabel().startswith("velocity [m/s]")
     assert figure.axes[-1].get_xlabel() == "time [s]"
-
-
-def test_fig_5_draws_the_accelerations_between_their_limits(
-    trajectories: Mapping[str, Trajectory],
-) -> None:
-    figure = acceleration_figure(trajectories, "title")
-    for axes, trajectory in zip(figure.axes, trajectories.values(), strict=True):
-        drawn = line_of(axes, "trolley acceleration")
-        assert_draws(drawn, trajectory.time, trajectory.acceleration)
-        limits = [line.get_ydata()[0] for line in axes.lines if line.get_label() == "limits"]
-        assert limits == [-5.0, 5.0]
-        assert axes.get_ylim()[0] < -5.0
-        assert axes.get_ylim()[1] > 5.0
-    assert figure.get_supylabel() == "trolley acceleration [m/s²]"
-
-
-@pytest.mark.parametrize("count", [1, 2, 8])
-def test_any_number_of_controllers_can_be_drawn(
-    trajectories: Mapping[str, Trajectory], count: int
-) -> None:
-    many = {f"controller {number}": trajectories["manual"] for number in range(count)}
-    values = {name: {"table1:1": np.ones(1)} for name in many}
-    for figure in (
-        velocity_figure(many, "title"),
-        acceleration_figure(many, "title"),
-        index_figure(values, "IAE [m]", "title"),
-    ):
-        figure.canvas.draw()  # matplotlib warns if there is no room
-        assert all(axes.get_position().height > 0.0 for axes in figure.axes)
-        title, (legend,) = figure.texts[0], figure.legends
-        assert not title.get_window_extent().overlaps(legend.get_window_extent())
 
 
 def test_figs_6_and_7_draw_means_with_their_spread_and_leave_out_what_is_not_defined() -> None:
@@ -149,15 +103,6 @@ def test_figs_6_and_7_draw_means_with_their_spread_and_leave_out_what_is_not_def
     assert to_hex(linear[0].get_facecolor()) == controller_colours(values)["linear"]
     written = [text.get_text() for text in axes.texts]
     assert written == ["3.00", "4.00", "4.00"]
-
-
-def test_an_index_that_no_episode_defines_leaves_the_axes_empty() -> None:
-    values = {"manual": {"random": np.array([np.nan])}, "linear": {"random": np.empty(0)}}
-    figure = index_figure(values, "release drift [m]", "title")
-    figure.canvas.draw()
-    assert not figure.axes[0].patches
-    single = index_figure({"manual": {"random": np.ones(1)}}, "IAE [m]", "title")
-    assert single.axes[0].containers[0].errorbar is None
 
 
 def test_a_controller_keeps_its_colour_and_shares_it_with_none() -> None:
@@ -204,11 +149,6 @@ def test_the_gallery_draws_figs_3_to_7_of_what_finished(tmp_path: Path) -> None:
     assert [file.name for file in files] == [f"fig{number}.png" for number in range(3, 8)]
     assert all(imread(file).std() > 0.0 for file in files)
     assert draw_gallery([failed], folder) == []
-
-
-def test_t1_to_t4_are_those_of_table_1() -> None:
-    assert list(table_1_instants("table1:10").values()) == [2.74, 3.67, 12.63, 12.34]
-    assert table_1_instants("random") == {}
 
 
 def test_drawing_imports_matplotlib_late_and_pyplot_never() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from baselines.evaluation.episode_spec import Setup
 from baselines.mpc.settings import MpcSettings
-from baselines.paper.claims import CLAIMS, NOT_CHECKABLE, Claim
+from baselines.paper.claims import CLAIMS, Claim
 from baselines.paper.evidence import Evidence, short_cable_oscillation, turning_points
 from crane_env import Trajectory
 from tests.episode.made_up import made_up_trajectory
@@ -112,27 +112,6 @@ def test_an_effect_without_the_word_always_may_miss_one_manoeuvre_of_ten() -> No
         finding = BY_NAME[name].check(change(controller, index, [factor, *ONE_OF_TEN]))
         assert finding.holds
         assert (finding.numbers["met"], finding.numbers["of"]) == (9, 10)
-
-
-def test_findings_say_what_was_measured() -> None:
-    def measured(name: str, evidence: Evidence = AGREEING) -> str:
-        return BY_NAME[name].check(evidence).measured
-
-    assert "nmpc-a 10 times" in measured("nmpc-takes-longer")
-    assert "p99 3 % of T_s" in measured("nmpc-takes-longer")
-    assert measured("acceleration-limit").endswith("the limit is never active")
-    at_limit = change("linear", "peak_acceleration", 2.0)
-    assert measured("acceleration-limit", at_limit).endswith("the limit is active")
-    assert measured("horizon-is-1-s") == "N_p T_s = 1 s, so that Δl = ±1 m"
-    assert measured("similar-iae") == "IAE within 1.8 %; within 5 % in 10 of 10"
-
-
-def test_what_cannot_be_checked_comes_with_a_reason() -> None:
-    assert NOT_CHECKABLE
-    for unchecked in NOT_CHECKABLE:
-        assert unchecked.section in ("V", "VI", "VII")
-        assert unchecked.statement
-        assert unchecked.reason
 
 
 @given(

@@ -118,10 +118,3 @@ def test_no_predictive_controller_ever_reaches_a_limit_or_loses_its_plan(indices
         assert not indices[name]["limit_violations"].any()
         assert not indices[name]["solver_failures"].any()
         assert not indices[name]["slack_time"].any()
-
-
-def test_figures_report_and_table_are_there(folder: Path) -> None:
-    figures = folder / "defaults" / "figures"
-    assert [file.name for file in sorted(figures.iterdir())] == [f"fig{n}.png" for n in range(3, 8)]
-    assert "| **not reproduced** |" in (folder / "report.md").read_text(encoding="utf-8")
-    assert (folder / "defaults" / "metrics.parquet").is_file()
