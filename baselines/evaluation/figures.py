@@ -144,11 +144,7 @@ def velocity_figure(trajectories: Mapping[str, Trajectory], title: str) -> Figur
             label="payload velocity",
         )
         _name_panel(axes, name, colours[name])
-    _share_label(figure, "velocity [m/s], scaled by panel")
-    _over_time(panels[-1], next(iter(trajectories.values())))
-    (first, *_), (label, *_) = panels[0].get_legend_handles_labels()
-    _legend(figure, [first], [label], "outside upper right")
-    return figure
+    return _finished(figure, panels, "velocity [m/s], scaled by panel", trajectories)
 
 
 def acceleration_figure(trajectories: Mapping[str, Trajectory], title: str) -> Figure:
@@ -176,11 +172,7 @@ def acceleration_figure(trajectories: Mapping[str, Trajectory], title: str) -> F
         )
         axes.set_ylim(-1.25 * limit, 1.25 * limit)
         _name_panel(axes, name, colours[name])
-    _share_label(figure, "trolley acceleration [m/s²]")
-    _over_time(panels[-1], next(iter(trajectories.values())))
-    (first, *_), (label, *_) = panels[0].get_legend_handles_labels()
-    _legend(figure, [first], [label], "outside upper right")
-    return figure
+    return _finished(figure, panels, "trolley acceleration [m/s²]", trajectories)
 
 
 def index_figure(
@@ -304,8 +296,15 @@ def _name_panel(axes: Axes, name: str, colour: str) -> None:
     axes.set_title(name, loc="left", fontsize=FONT_SIZE, color=colour, fontweight="bold", pad=3.0)
 
 
-def _share_label(figure: Figure, label: str) -> None:
+def _finished(
+    figure: Figure, panels: Sequence[Axes], label: str, trajectories: Mapping[str, Trajectory]
+) -> Figure:
+    """The figure with the label that its panels share, the time axis and one legend entry."""
     figure.supylabel(label, fontsize=FONT_SIZE, color=INK)
+    _over_time(panels[-1], next(iter(trajectories.values())))
+    (first, *_), (name, *_) = panels[0].get_legend_handles_labels()
+    _legend(figure, [first], [name], "outside upper right")
+    return figure
 
 
 def _over_time(axes: Axes, trajectory: Trajectory) -> None:

@@ -59,7 +59,7 @@ UNDEFINED = "-"
 
 def summary_table(results: Sequence[EpisodeResult]) -> Table:
     """One row a controller: what its episodes came to."""
-    table = _table(
+    table = terminal_table(
         "Controllers",
         "Mean ± standard deviation over the episodes (±50 mm band for settling). Act times: median "
         "over the episodes, by the wall clock, on this machine, as busy as it was.",
@@ -90,7 +90,7 @@ def operator_table(results: Sequence[EpisodeResult], index: str, title: str) -> 
         title: of the table, with the unit, in rich's markup.
     """
     values = index_values(results, index)
-    table = _table(title, f"{WINNER} lowest of its row")
+    table = terminal_table(title, f"{WINNER} lowest of its row")
     table.add_column("operator")
     for controller in values:
         table.add_column(controller, justify="right")
@@ -103,6 +103,18 @@ def operator_table(results: Sequence[EpisodeResult], index: str, title: str) -> 
         table.add_row(operator, *(_cell(mean, name in winners) for name, mean in means.items()))
     table.add_section()
     table.add_row("wins", *map(str, wins.values()))
+    return table
+
+
+def terminal_table(title: str, caption: str | None = None) -> Table:
+    """A table without columns yet, in the style of all in the terminal; texts in rich's markup."""
+    table: Table = require("rich.table", extra="results").Table(
+        title=title,
+        title_justify="left",
+        caption=caption,
+        caption_justify="left",
+        box=require("rich.box", extra="results").SIMPLE_HEAD,
+    )
     return table
 
 
@@ -151,15 +163,3 @@ def _cell(value: float, wins: bool) -> str:
     if math.isnan(value):
         return UNDEFINED
     return f"[bold green]{value:.3f} {WINNER}[/]" if wins else f"{value:.3f}  "
-
-
-def _table(title: str, caption: str) -> Table:
-    table: Table = require("rich.table", extra="results").Table(
-        title=title,
-        title_justify="left",
-        caption=caption,
-        caption_justify="left",
-        box=require("rich.box", extra="results").SIMPLE_HEAD,
-        padding=(0, 1),
-    )
-    return table

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from baselines.evaluation.provenance import machine, package_versions
-from baselines.evaluation.tables import markdown_table
+from baselines.evaluation.tables import markdown_table, terminal_table
 from baselines.paper.checks import percent
 from baselines.paper.claims import NOT_CHECKABLE
 from baselines.paper.evidence import Evidence, plain
@@ -285,11 +285,7 @@ def _holds(holds: bool) -> str:
 
 def _terminal_table(title: str, head: Iterable[str]) -> Table:
     escape = require("rich.markup", extra="results").escape
-    table: Table = require("rich.table", extra="results").Table(
-        title=title,
-        title_justify="left",
-        box=require("rich.box", extra="results").SIMPLE_HEAD,
-    )
+    table = terminal_table(title)
     for name in head:
         table.add_column(escape(name))
     return table
