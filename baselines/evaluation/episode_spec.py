@@ -25,6 +25,7 @@ from baselines.registry import CONTROLLERS, make_controller, settings_type
 from crane_env import CraneParameters, Trajectory, run_episode
 from crane_env.controller import Controller
 from crane_env.operators.registry import FAMILIES, operator_program
+from crane_env.support.checks import seed as checked_seed
 from crane_env.support.checks import whole
 from crane_env.support.factory import is_place
 
@@ -123,13 +124,11 @@ def episode_specs(
         setup: what all episodes have in common.
 
     Raises:
-        ValueError: an unknown operator, a malformed script, a negative seed, or nothing to play.
+        ValueError: an unknown operator, a malformed script, a seed out of range, nothing to play.
         FileNotFoundError: a script that is not there.
     """
     programs = [operator_program(name) for name in dict.fromkeys(operators)]
-    distinct_seeds = list(dict.fromkeys(seeds))
-    if any(seed < 0 for seed in distinct_seeds):
-        raise ValueError(f"A seed is a whole number of at least 0, not {min(distinct_seeds)}.")
+    distinct_seeds = list(dict.fromkeys(map(checked_seed, seeds)))
     specs = [
         EpisodeSpec(controller=controller, operator=program, seed=seed, setup=setup)
         for controller in dict.fromkeys(controllers)

@@ -140,14 +140,14 @@ class ResultsFolder:
         return metrics
 
     def load_episode(self, spec: EpisodeSpec, keep: Keep) -> EpisodeResult | None:
-        """A finished episode; None if there is none, or not all of it."""
+        """A finished episode; None if there is none, or not all of it, or it cannot be read."""
         try:
             record = json.loads(self.record_file(spec).read_text(encoding="utf-8"))
             metrics = Metrics(**_none_to_nan(record["metrics"]))
             wall_time = float(record["wall_time"])
+            if keep == "trajectories":
+                self.trajectory(spec)
         except (OSError, ValueError, KeyError, TypeError):
-            return None
-        if keep == "trajectories" and not self.trajectory_file(spec).is_file():
             return None
         return EpisodeResult(spec, metrics, wall_time)
 

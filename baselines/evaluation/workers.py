@@ -126,6 +126,8 @@ def perform(task: Task) -> EpisodeResult:
         if own.key != task.key:
             raise RuntimeError("the code changed while the comparison was running")
         trajectory = play(task.spec)
+        if trajectory.simulation_failed:
+            raise RuntimeError(f"the simulation diverged after {trajectory.time[-1]:.2f} s")
         wall_time = perf_counter() - start
         metrics = ResultsFolder(task.folder).save_episode(
             task.spec, trajectory, wall_time, task.keep

@@ -13,13 +13,14 @@ import pyarrow.parquet
 import pytest
 
 import baselines.evaluation.episode_spec
+import baselines.evaluation.workers
 import crane_env
 from baselines.evaluation import provenance
 from baselines.evaluation.comparison import check_controllers, compare, index_values
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs, play
 from baselines.evaluation.results import PARTIAL_AGE, EpisodeResult, ResultsFolder
 from baselines.evaluation.tables import lowest, mean_and_deviation
-from baselines.evaluation.workers import Task, play_all
+from baselines.evaluation.workers import Task, perform, play_all
 from baselines.mpc.settings import MpcSettings
 from crane_env import CraneParameters, Trajectory
 from crane_env.operators.registry import operator_program
@@ -217,6 +218,18 @@ def test_an_episode_that_raises_is_reported_and_the_others_finish(tmp_path: Path
     assert [result.reused for result in again] == [False, True, True, True]
 
 
+def test_an_episode_whose_simulation_diverges_is_failed_and_in_no_mean(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (spec,) = specs_of("manual")
+    diverged = dataclasses.replace(play(spec), simulation_failed=True)
+    monkeypatch.setattr(baselines.evaluation.workers, "play", lambda _: diverged)
+    result = perform(Task(spec, spec.key, tmp_path, "metrics"))
+    assert result.status == "failed"
+    assert "the simulation diverged after 2.38 s" in result.failure
+    assert index_values([result], "IAE")["manual"]["table1:1"].size == 0
+
+
 def test_a_worker_that_dies_fails_its_episode_alone(tmp_path: Path) -> None:
     specs = specs_of(f"{STUBS}:dying", "manual", operators=("table1:1", "table1:8", "table1:5"))
     results = compare(specs, ResultsFolder(tmp_path), jobs=1)
@@ -260,8 +273,10 @@ def test_an_interrupted_comparison_keeps_what_finished_and_goes_on_from_there(
     manifest = folder.read_manifest()
     assert manifest["status"] == "interrupted"
     states = [entry["status"] for entry in manifest["episodes"]]
-    assert states == ["finished"] * 2 + ["pending"] * 4
-    assert [row["operator"] for row in folder.read_metrics()] == ["table1:1", "table1:2"]
+    finished = states.count("finished")  # a worker may have finished more than it could tell
+    assert states == ["finished"] * finished + ["pending"] * (6 - finished)
+    assert 2 <= finished < 6
+    assert len(folder.read_metrics()) == finished
     assert not list(tmp_path.rglob(".*"))
     results = compare(specs, folder, jobs=1)
     assert [result.reused for result in results[:2]] == [True, True]
@@ -271,13 +286,15 @@ def test_an_interrupted_comparison_keeps_what_finished_and_goes_on_from_there(
 
 def test_a_damaged_or_incomplete_episode_is_played_again(tmp_path: Path) -> None:
     folder = ResultsFolder(tmp_path)
-    specs = specs_of("manual", operators=("table1:1", "table1:2", "table1:3"))
+    specs = specs_of("manual", operators=("table1:1", "table1:2", "table1:3", "table1:4"))
     compare(specs, folder, jobs=1)
     record = folder.record_file(specs[0])
     record.write_text(record.read_text(encoding="utf-8")[:50], encoding="utf-8")
     folder.trajectory_file(specs[1]).unlink()
+    cut = folder.trajectory_file(specs[2])
+    cut.write_bytes(cut.read_bytes()[:-200])
     results = compare(specs, folder, jobs=1)
-    assert [result.reused for result in results] == [False, False, True]
+    assert [result.reused for result in results] == [False, False, False, True]
     assert {result.status for result in results} == {"finished"}
 
 
@@ -411,8 +428,10 @@ def test_nonsense_is_refused_with_what_is_allowed() -> None:
         Setup(max_steps=0)
     with pytest.raises(ValueError, match="at least 1, not True"):
         Setup(max_steps=True)
-    with pytest.raises(ValueError, match="at least 0, not -3"):
+    with pytest.raises(ValueError, match=r"at least 0 and below \d+, not -3"):
         episode_specs(["manual"], ["random"], [1, -3], SHORT)
+    with pytest.raises(ValueError, match="below 9223372036854775808"):
+        episode_specs(["manual"], ["random"], [2**63], SHORT)
     with pytest.raises(ValueError, match="nothing to play"):
         episode_specs([], ["random"], [0], SHORT)
     with pytest.raises(ValueError, match="Unknown controller 'nobody'; valid: manual, linear"):
