@@ -5,25 +5,23 @@ differences d_i of an index, i = 1 ... n, the mean difference and its confidence
 what the manoeuvres themselves vary by.
 
     mean       bias-corrected and accelerated bootstrap (BCa; B. Efron, J. American Statistical
-               Association 82, 1987), which assumes no distribution of the d_i: the quantiles of the
-               resampled means at
-
-                   Phi(z_0 + (z_0 + z) / (1 - a (z_0 + z)))    z = Phi^-1((1 -+ confidence) / 2)
-
-               with z_0 from the share of resampled means below the mean, and a, for a mean,
-               sum (d_i - mean)^3 / (6 (sum (d_i - mean)^2)^(3/2))
+               Association 82, 1987), which assumes no distribution of the d_i
     a share    Wilson's score interval (E. B. Wilson, J. American Statistical Association 22, 1927)
 """
 
 from __future__ import annotations
 
-import math
+import warnings
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from crane_env.support.extras import require
+
+BATCH = 1000
+"""So many resamples are drawn at once, to save memory."""
 
 
 class Interval(NamedTuple):
@@ -115,30 +113,23 @@ def mean_interval(
     _check_confidence(confidence)
     if sample.ndim != 1 or sample.size < 2 or not np.isfinite(sample).all():
         raise ValueError("An interval of a mean needs at least two values, all finite.")
-    mean = sample.mean()
-    deviations = sample - mean
-    spread = float(deviations @ deviations)
-    if spread == 0.0:
-        return Interval(float(mean), float(mean))
-    means = np.empty(resamples)
-    block = max(1, BLOCK_SIZE // sample.size)
-    for start in range(0, resamples, block):
-        part = means[start : start + block]
-        part[:] = sample[rng.integers(sample.size, size=(part.size, sample.size))].mean(axis=1)
-    below = (np.count_nonzero(means < mean) + np.count_nonzero(means <= mean)) / (2 * resamples)
-    if not 0.0 < below < 1.0:
-        # Rounding alone separates the values: the resampled means have no quantiles to speak of.
-        return Interval(float(sample.min()), float(sample.max()))
-    normal = NormalDist()
-    bias = normal.inv_cdf(below)
-    acceleration = float((deviations**3).sum()) / (6.0 * spread**1.5)
-    tail = (1.0 - confidence) / 2.0
-    ends = []
-    for level in (tail, 1.0 - tail):
-        shifted = bias + normal.inv_cdf(level)
-        ends.append(normal.cdf(bias + shifted / (1.0 - acceleration * shifted)))
-    low, high = np.quantile(means, ends)
-    return Interval(float(low), float(high))
+    ends = (sample.min(), sample.max())
+    if ends[0] < ends[1]:
+        with warnings.catch_warnings():
+            # Where rounding alone separates the values, the resampled means have no quantiles.
+            warnings.simplefilter("ignore")
+            found = require("scipy.stats", extra="results").bootstrap(
+                (sample,),
+                np.mean,
+                n_resamples=resamples,
+                batch=BATCH,
+                confidence_level=confidence,
+                method="BCa",
+                rng=rng,
+            )
+        if np.isfinite(found.confidence_interval).all():
+            ends = found.confidence_interval
+    return Interval(float(ends[0]), float(ends[1]))
 
 
 def share_interval(successes: int, trials: int, confidence: float = 0.95) -> Interval:
@@ -155,18 +146,11 @@ def share_interval(successes: int, trials: int, confidence: float = 0.95) -> Int
     _check_confidence(confidence)
     if not 0 <= successes <= trials or trials < 1:
         raise ValueError(f"A share needs 0 <= successes <= trials, not {successes} of {trials}.")
-    z = NormalDist().inv_cdf((1.0 + confidence) / 2.0)
-    share = successes / trials
-    centre = share + z**2 / (2 * trials)
-    reach = z * math.sqrt(share * (1.0 - share) / trials + z**2 / (4 * trials**2))
-    scale = 1.0 + z**2 / trials
-    return Interval(max(0.0, (centre - reach) / scale), min(1.0, (centre + reach) / scale))
+    test = require("scipy.stats", extra="results").binomtest(successes, trials)
+    low, high = test.proportion_ci(confidence, method="wilson")
+    return Interval(float(low), float(high))
 
 
 def _check_confidence(confidence: float) -> None:
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"A confidence lies between 0 and 1, not at {confidence!r}.")
-
-
-BLOCK_SIZE = 1_000_000
-"""So many values are resampled at once: 8 MB."""

@@ -1,4 +1,4 @@
-"""Statistics: intervals against scipy's, closed forms, and the coverage that they promise."""
+"""Statistics: intervals against closed forms, and the coverage that they promise."""
 
 from __future__ import annotations
 
@@ -14,20 +14,6 @@ from baselines.evaluation.statistics import (
     paired_difference,
     share_interval,
 )
-
-
-def test_the_bootstrap_interval_is_scipys_up_to_resampling_noise() -> None:
-    sample = np.random.default_rng(1).gamma(1.5, size=60)
-    ours = mean_interval(sample, np.random.default_rng(2), 0.9, resamples=100_000)
-    theirs = stats.bootstrap(
-        (sample,),
-        np.mean,
-        n_resamples=100_000,
-        confidence_level=0.9,
-        method="BCa",
-        rng=np.random.default_rng(3),
-    ).confidence_interval
-    assert ours == pytest.approx(tuple(theirs), abs=0.01 * (theirs.high - theirs.low))
 
 
 def test_for_many_normal_differences_the_interval_is_students() -> None:
@@ -48,25 +34,12 @@ def test_an_interval_holds_the_true_mean_of_a_skewed_sample_as_often_as_it_says(
     assert covered / trials == pytest.approx(0.9, abs=3.0 * np.sqrt(0.9 * 0.1 / trials))
 
 
-def test_equal_seeds_give_equal_intervals() -> None:
-    sample = np.random.default_rng(7).normal(size=30)
-    intervals = {mean_interval(sample, np.random.default_rng(8)) for _ in range(2)}
-    assert len(intervals) == 1
-
-
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=30), st.integers(0, 2**32))
 def test_an_interval_lies_within_the_sample_and_in_order(values: list[float], seed: int) -> None:
     sample = np.array(values)
     low, high = mean_interval(sample, np.random.default_rng(seed), resamples=199)
     rounding = 1e-9 * (1.0 + np.abs(sample).max())
     assert sample.min() - rounding <= low <= high <= sample.max() + rounding
-
-
-@given(st.integers(1, 2000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
-def test_the_interval_of_a_share_is_scipys(counts: tuple[int, int]) -> None:
-    successes, trials = counts
-    theirs = stats.binomtest(successes, trials).proportion_ci(0.95, method="wilson")
-    assert share_interval(successes, trials) == pytest.approx((theirs.low, theirs.high), abs=1e-12)
 
 
 def test_pairing_leaves_out_what_the_manoeuvres_vary_by() -> None:
