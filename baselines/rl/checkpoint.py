@@ -42,8 +42,8 @@ else:
     torch = require("torch", extra="rl")
     stable_baselines3 = require("stable_baselines3", extra="rl")
 
-FORMAT = "oilcrane-checkpoint-1"
-"""Version of the archive's layout."""
+FORMAT = "oilcrane-checkpoint-2"
+"""Version of the archive's layout and of the classes in its pickles."""
 
 HEADER = "checkpoint.json"
 
@@ -137,7 +137,7 @@ def load_checkpoint(path: Path) -> tuple[BaseAlgorithm, Progress]:
             best=torch.load(io.BytesIO(entries["best.pth"]), weights_only=True),
         )
         python, numpy_state, torch_state = pickle.loads(entries["random.pickle"])
-    except (KeyError, TypeError, pickle.UnpicklingError, RuntimeError) as error:
+    except Exception as error:  # a pickle that is not whole may fail in any way
         raise _corrupt(path, error) from error
     random.setstate(python)
     np.random.set_state(numpy_state)  # noqa: NPY002
@@ -165,7 +165,7 @@ def _archive(path: Path) -> zipfile.ZipFile:
 def _header(path: Path, archive: zipfile.ZipFile) -> dict[str, Any]:
     try:
         header: Any = json.loads(archive.read(HEADER))
-        found = header["format"]
+        found, _ = header["format"], {**header["settings"]}
     except (KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
         raise _corrupt(path, error) from error
     if found != FORMAT:

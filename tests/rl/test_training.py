@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import io
 import json
-import math
 import os
 import shutil
 import signal
@@ -13,34 +13,28 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 import torch
-from gymnasium.vector import AutoresetMode
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import crane_env  # noqa: F401  registers OILCrane-v0
-from baselines.rl import validation
+from baselines.commands.train import main
 from baselines.rl.checkpoint import (
-    Progress,
+    FORMAT,
     is_checkpoint,
     load_checkpoint,
     read_settings,
     save_checkpoint,
 )
-from baselines.rl.environment import LearnersView, training_environment
 from baselines.rl.export import export_file, export_run
-from baselines.rl.network import CraneFeatures, GainScheduledPolicy
 from baselines.rl.onnx_policy import OnnxPolicy, read_card
-from baselines.rl.recorder import CHECKPOINT, CURVE, Recorder, policy_of, read_curve
-from baselines.rl.settings import ALGORITHMS, REWARDS, TRAINING_SEEDS, TrainingSettings
+from baselines.rl.recorder import CHECKPOINT, CURVE, policy_of, read_curve
+from baselines.rl.settings import TrainingSettings
 from baselines.rl.training import TENSORBOARD, new_model, train
 from baselines.rl.validation import VALIDATION, VALIDATION_SEEDS, Validation, drive
-from crane_env.observation import Observation, observation_space
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
 from tests.rl.test_export import FLOAT32, observations
@@ -197,7 +191,14 @@ def test_the_logs_tell_the_validation_and_the_learners_own_numbers(
     assert [step for step, _ in scalars["validation/IAE"]] == [row["steps"] for row in curve]
 
 
-def test_sac_stopped_and_resumed_ends_bit_for_bit_as_one_that_was_not(tmp_path: Path) -> None:
+def test_sac_stopped_and_resumed_ends_bit_for_bit_as_one_that_was_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cost_of_standing(policy: Any, *_: Any, steps: int, **__: Any) -> Validation:
+        return Validation(steps, 0.0, None, float(policy(observations(1)).item()), 0.0, 0.0, 0.0)
+
+    monkeypatch.setattr("baselines.rl.recorder.validate", cost_of_standing)
+
     def stop(steps: int, _: Any) -> None:
         if steps > 1500:
             raise KilledError
@@ -217,7 +218,7 @@ def test_equal_seeds_train_equal_policies_and_other_seeds_do_not() -> None:
     runs = []
     for seed in (3, 3, 4):
         model = new_model(TrainingSettings.of({**TINY_PPO.as_dict(), "seed": seed}))
-        runs.append(weights(model.learn(600)))
+        runs.append(weights(model.learn(150)))
     assert all(torch.equal(runs[0][name], runs[1][name]) for name in runs[0])
     name = "mlp_extractor.gains.0.weight"
     assert not torch.equal(runs[0][name], runs[2][name])
@@ -240,220 +241,6 @@ def test_the_kept_policy_is_the_best_of_the_validation(uninterrupted: tuple[Path
     assert again["stage_cost"].mean() == pytest.approx(best.stage_cost, rel=1e-9)
 
 
-def test_a_crane_that_diverges_costs_infinitely_and_leaves_the_others_validation_untouched(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def policy(observations: Any) -> Any:
-        seen = Observation(*observations.T)
-        return 2.0 * (seen.travel_reference - seen.trolley_velocity)[:, None]
-
-    def play(spoil: Any = None, policy: Any = policy) -> Any:
-        made = []
-
-        def make_and_keep(*arguments: Any, **settings: Any) -> Any:
-            made.append(gymnasium.make_vec(*arguments, max_episode_steps=400, **settings))
-            return made[0]
-
-        steps = iter(range(400))
-
-        def drive_and_spoil(observations: Any) -> Any:
-            if next(steps) == 150 and spoil is not None:
-                made[0].unwrapped.plant._velocity[1, 2] = 1e11
-            return policy(observations)
-
-        monkeypatch.setattr(validation, "gymnasium", SimpleNamespace(make_vec=make_and_keep))
-        return drive(drive_and_spoil, [VALIDATION] * 3, 7, CraneParameters(), StageCost())
-
-    def without_a_number(observations: Any) -> Any:
-        answers = policy(observations)
-        answers[1] = np.nan
-        return answers
-
-    whole = play()
-    assert np.isfinite(whole["stage_cost"]).all()
-    for broken in (play(spoil=True), play(policy=without_a_number)):
-        for name, values in broken.items():
-            assert values[1] == math.inf
-            np.testing.assert_array_equal(values[[0, 2]], whole[name][[0, 2]])
-
-
-def test_a_policy_that_failed_is_never_the_best_of_several(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    costs = iter([math.inf, 3.0, math.inf])
-    monkeypatch.setattr(
-        "baselines.rl.recorder.validate",
-        lambda *_, steps, **__: Validation(steps, 0.0, None, next(costs), 0.0, 0.0, 0.0),
-    )
-    recorder = Recorder(TINY_PPO, tmp_path, Progress(), lambda *_: None)
-    recorder.model = new_model(TINY_PPO)
-    kept = []
-    for bias in (1.0, 2.0, 3.0):
-        recorder.model.policy.value_net.bias.data.fill_(bias)
-        recorder._validate()
-        kept.append(recorder.progress.best["value_net.bias"].item())
-    assert kept == [1.0, 2.0, 2.0]
-
-
-def test_seeds_of_training_validation_and_test_never_meet() -> None:
-    test_set = set(range(1000))
-    validation = set(range(VALIDATION_SEEDS, VALIDATION_SEEDS + 1000))
-    first = TrainingSettings(seed=0).environment_seed
-    last = TrainingSettings(seed=99).environment_seed
-    assert not test_set & validation
-    assert max(validation) < first == TRAINING_SEEDS < last
-    assert TrainingSettings(seed=1).environment_seed - first >= TrainingSettings().count
-    model = new_model(TINY_PPO)
-    assert model.get_env()._seeds[0] == TINY_PPO.environment_seed  # type: ignore[union-attr]
-
-
-def test_held_actions_earn_the_sum_of_the_rewards_of_their_periods() -> None:
-    def cranes() -> Any:
-        return gymnasium.make_vec(
-            "OILCrane-v0", num_envs=3, operator="manoeuvre", autoreset_mode=AutoresetMode.SAME_STEP
-        )
-
-    settings = TrainingSettings(action_hold=4, acceleration_scale=2.0, environments=3)
-    held, bare = LearnersView(cranes(), settings), cranes()
-    held._first_end[:] = 10**6
-    held.reset(seed=5)
-    bare.reset(seed=5)
-    rng = np.random.default_rng(0)
-    # 1250 is no multiple of 4: the last hold of an episode reaches into the next one.
-    for decision in range(320):
-        action = rng.uniform(-0.2, 0.2, (3, 1))
-        observation, reward, terminated, truncated, infos = held.step(action)
-        total, ended, last = np.zeros(3), np.zeros(3, dtype=bool), None
-        for _ in range(4):
-            expected, earned, failed, timed_out, info = bare.step(2.0 * action)
-            total += np.where(ended, 0.0, earned)
-            if timed_out.any():
-                last = info["final_obs"]
-            ended |= failed | timed_out
-        np.testing.assert_array_equal(observation, expected)
-        np.testing.assert_allclose(reward, total, rtol=0, atol=1e-14)
-        np.testing.assert_array_equal(truncated, ended)
-        assert not terminated.any()
-        assert truncated.all() == (decision == 312)
-        if truncated.any():
-            assert last is not None
-            np.testing.assert_array_equal(np.stack(infos["final_obs"]), np.stack(last))
-
-
-def test_first_episodes_end_at_different_times_and_all_later_ones_on_time() -> None:
-    settings = TrainingSettings(environments=4, action_hold=50)
-    env = training_environment(settings)
-    env.reset()
-    lengths: list[list[int]] = [[] for _ in range(4)]
-    for _ in range(80):
-        _, _, _, infos = env.step(np.zeros((4, 1), dtype=np.float32))
-        for index, info in enumerate(infos):
-            if "episode" in info:
-                assert info["TimeLimit.truncated"]
-                assert info["terminal_observation"].shape == (8,)
-                lengths[index].append(info["episode"]["l"])
-    env.close()
-    assert len({one[0] for one in lengths}) > 1
-    assert all(length == 12 for one in lengths for length in one[1:])
-    assert any(len(one) > 1 for one in lengths)
-
-
-def test_named_rewards_are_what_their_formulas_say() -> None:
-    error, sway, effort, period = np.array([0.5, -0.2]), 0.3, 0.7, 0.02
-    terms = (-period * error**2, np.full(2, -period * sway), np.full(2, -period * effort))
-    rates = {name: reward(terms, period) / -period for name, reward in REWARDS.items()}
-    np.testing.assert_allclose(rates["stage-cost"], error**2 + sway + effort)
-    np.testing.assert_allclose(rates["absolute-error"], np.abs(error) + sway + effort)
-    np.testing.assert_allclose(rates["tracking"], error**2 + effort)
-
-
-def test_the_domain_randomisation_switch_varies_the_cranes() -> None:
-    for randomise in (False, True):
-        env = training_environment(TrainingSettings(environments=4, randomise=randomise))
-        env.reset()
-        cranes = env.env.unwrapped.cranes  # type: ignore[attr-defined]
-        assert len({crane.cable_length_initial for crane in cranes}) == 4
-        assert len({crane.payload_mass for crane in cranes}) == (4 if randomise else 1)
-        env.close()
-
-
-def test_a_mirrored_observation_gets_the_mirrored_action_and_the_same_value() -> None:
-    model = new_model(TINY_PPO)
-    policy = model.policy
-    assert isinstance(policy, GainScheduledPolicy)
-    torch.manual_seed(1)
-    for parameter in policy.mlp_extractor.parameters():
-        torch.nn.init.normal_(parameter)
-    space = observation_space(CraneParameters())
-    rng = np.random.default_rng(2)
-    seen = rng.uniform(np.maximum(space.low, -1.0), np.minimum(space.high, 5.0), (50, 8))
-    mirror = np.array([-1, -1, 1, 1, -1, -1, -1, 1])
-    there, here = (torch.as_tensor(o) for o in (seen * mirror, seen))
-    with torch.no_grad():
-        actions, value, _ = policy(here, deterministic=True)
-        mirrored, same, _ = policy(there, deterministic=True)
-    assert actions.abs().max() > 0.1
-    torch.testing.assert_close(mirrored, -actions)
-    torch.testing.assert_close(same, value)
-    assert CraneFeatures(space)(here.float()).shape == (50, 17)
-
-
-def test_a_crane_at_rest_and_one_that_moves_as_asked_are_left_alone() -> None:
-    policy = new_model(TINY_PPO).policy
-    for parameter in policy.mlp_extractor.parameters():  # type: ignore[union-attr,operator]
-        torch.nn.init.normal_(parameter)
-    for w in (-1.0, 0.0, 1.0):
-        action, _ = policy.predict(np.array([3.0, w, 6.0, 0.0, 0.0, 0.0, w, 0.0]), None, None, True)
-        assert action[0] == 0.0
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"algorithm": "trpo"}, "Unknown algorithm 'trpo'; valid: ppo, sac, a2c, ddpg, td3"),
-        ({"reward": "joy"}, "Unknown reward 'joy'; valid: stage-cost"),
-        ({"steps": 0}, "steps must be a whole number of at least 1"),
-        ({"steps": 10**400}, "steps must be a whole number of at least 1 and below"),
-        ({"seed": -1}, "seed must be a whole number of at least 0"),
-        ({"seed": True}, "seed must be a whole number of at least 0"),
-        ({"environments": 10**5}, "environments must be a whole number .* below 10001"),
-        ({"environments": "5"}, "environments must be a whole number"),
-        ({"randomise": "no"}, "randomise must be True or False, not 'no'"),
-        ({"hyperparameters": [1]}, "hyperparameters must map the names"),
-        ({"operator": "ghost"}, "ghost"),
-        ({"acceleration_scale": math.nan}, "acceleration_scale must be a positive finite number"),
-        ({"acceleration_scale": 9.0}, "at most the crane's 5.0 m/s"),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        TrainingSettings(**settings)
-
-
-def test_numpys_numbers_are_settings() -> None:
-    settings = TrainingSettings(seed=np.int64(3), steps=np.uint8(9), acceleration_scale=np.int8(2))
-    assert settings == TrainingSettings(seed=3, steps=9, acceleration_scale=2.0)
-    assert json.dumps(settings.as_dict())
-
-
-def test_unknown_hyperparameters_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"ppo refuses its hyperparameters: .*magic"):
-        new_model(TrainingSettings(environments=2, hyperparameters={"magic": 1}))
-
-
-@pytest.mark.parametrize("name", [name for name in ALGORITHMS if name not in ("ppo", "sac")])
-def test_the_other_algorithms_can_be_built_by_name(name: str) -> None:
-    model = new_model(TrainingSettings(algorithm=name, environments=2))
-    assert type(model).__name__ == name.upper()
-
-
-def test_settings_survive_their_way_through_json() -> None:
-    settings = TrainingSettings(seed=4, randomise=True, parameters=CraneParameters(payload_mass=50))
-    assert TrainingSettings.of(json.loads(json.dumps(settings.as_dict()))) == settings
-    with pytest.raises(ValueError, match="Unknown training setting 'colour'; valid: algorithm"):
-        TrainingSettings.of({"colour": "red"})
-
-
 def test_a_checkpoint_of_another_version_is_refused_before_anything_is_unpickled(
     uninterrupted: tuple[Path, Any], tmp_path: Path
 ) -> None:
@@ -471,7 +258,11 @@ def test_a_corrupt_checkpoint_is_refused(uninterrupted: tuple[Path, Any], tmp_pa
     whole = (uninterrupted[0] / CHECKPOINT).read_bytes()
     broken = tmp_path / "broken.zip"
     middle = len(whole) // 2
-    for data in (whole[:middle], b"", whole[:middle] + b"\xff" * 9 + whole[middle + 9 :]):
+    header = io.BytesIO()
+    with zipfile.ZipFile(header, "w") as archive:
+        archive.writestr("checkpoint.json", json.dumps({"format": FORMAT, "settings": None}))
+    damaged = whole[:middle] + b"\xff" * 9 + whole[middle + 9 :]
+    for data in (whole[:middle], b"", damaged, header.getvalue()):
         broken.write_bytes(data)
         with pytest.raises(ValueError, match="is not a whole checkpoint"):
             load_checkpoint(broken)
@@ -490,19 +281,14 @@ def test_a_folder_with_a_run_of_other_settings_is_refused(
         train(TrainingSettings.of({**TINY_PPO.as_dict(), "seed": 1}), folder)
 
 
-def test_the_command_line_refuses_bad_input_with_one_sentence(tmp_path: Path) -> None:
+def test_the_command_line_refuses_bad_input_with_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for arguments, sentence in (
         (["--algorithm", "magic"], "Unknown algorithm 'magic'; valid: ppo, sac"),
         (["--hyperparameters", "["], "hyperparameters must be a JSON object"),
         (["--export", str(tmp_path / "no.zip")], "There is no model"),
+        (["--parameters", "field"], "parameters and statistics belong to --export"),
     ):
-        done = subprocess.run(
-            [sys.executable, "scripts/train_rl.py", *arguments],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-        )
-        assert done.returncode == 2
-        assert sentence in done.stderr
-        assert "Traceback" not in done.stderr
+        assert main(arguments) == 2
+        assert sentence in capsys.readouterr().err
