@@ -11,6 +11,7 @@ in the output folder, so that the same command goes on where it was interrupted.
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -286,12 +287,15 @@ def unseen_section(options: Options, play: Play) -> list[str]:
 
 def shift_section(options: Options, play: Play) -> list[str]:
     """Means on cranes and with operators that were not trained on."""
+    seeds = range(options.shifted_manoeuvres)
+    shifted = [
+        episode_specs(options.controllers, [operator], seeds, Setup(crane=parameters))
+        for operator, parameters in DISTRIBUTION_SHIFTS.values()
+    ]
+    played = iter(play([spec for specs in shifted for spec in specs], "out of distribution"))
     rows = []
-    for title, (operator, parameters) in DISTRIBUTION_SHIFTS.items():
-        setup = Setup(crane=parameters)
-        seeds = range(options.shifted_manoeuvres)
-        specs = episode_specs(options.controllers, [operator], seeds, setup)
-        results = play(specs, title)
+    for title, specs in zip(DISTRIBUTION_SHIFTS, shifted, strict=True):
+        results = list(itertools.islice(played, len(specs)))
         rows.append(
             [
                 title,
