@@ -12,6 +12,7 @@ import json
 import os
 import platform
 import sys
+import tempfile
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -32,6 +33,9 @@ from rich.table import Table
 import crane_env
 from baselines import make_controller
 from baselines.commands.terminal import Job, check_writable, run, table_console
+from baselines.evaluation.comparison import compare
+from baselines.evaluation.episode_spec import Setup, episode_specs
+from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.workers import available_cores
 from baselines.mpc.controller import PredictiveController
 from baselines.mpc.ipopt_form import WARM_BARRIER, IpoptNmpc
@@ -303,6 +307,34 @@ def resident_memory() -> int:
     return int(status.read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
+EVALUATED = 10
+"""So many episodes of an evaluation are timed together."""
+
+
+def benchmark_evaluate(rounds: int) -> list[Timing]:
+    """An episode of `adaptive` in an evaluation, kept on the disk, against it played bare.
+
+    The start of the processes is left out; it takes a second or two.
+    """
+    specs = episode_specs(["adaptive"], ["random"], range(EVALUATED * (rounds + 1)), Setup())
+    env, controller = gymnasium.make("OILCrane-v0"), make_controller("adaptive")
+    bare = in_turns(
+        {"run_episode": lambda k: crane_env.run_episode(env, controller, seed=k)}, len(specs)
+    )["run_episode"]
+    paces = {"run_episode": bare.reshape(-1, EVALUATED).mean(axis=1)[1:]}
+    for jobs in (1, 2):
+        ends: list[float] = []
+
+        def note(result: EpisodeResult, ends: list[float] = ends) -> None:
+            ends.append(perf_counter())
+
+        with tempfile.TemporaryDirectory() as folder:
+            compare(specs, ResultsFolder(Path(folder)), jobs=jobs, on_result=note)
+        paces[f"evaluate, jobs {jobs}"] = np.diff(ends[EVALUATED - 1 :: EVALUATED]) / EVALUATED
+    allowed = {"evaluate, jobs 1": "<= 1.05", "evaluate, jobs 2": "<= 0.58"}
+    return timings(paces, "run_episode", allowed)
+
+
 VECTOR_SIZE = 1024
 """Cranes of the section "vector"."""
 
@@ -345,6 +377,7 @@ SECTIONS: dict[str, Callable[[int], list[Timing]]] = {
     "linear": benchmark_linear,
     "solvers": benchmark_solvers,
     "vector": benchmark_vector,
+    "evaluate": benchmark_evaluate,
 }
 
 
@@ -370,7 +403,7 @@ class Options:
     """Measures the speed of environment and controllers, as ratios taken in one run.
 
     Attributes:
-        sections: which to run, of environment, linear, solvers and vector.
+        sections: which to run, of environment, linear, solvers, vector and evaluate.
         rounds: more rounds, steadier medians.
         output: write the results to this JSON file too.
     """

@@ -152,7 +152,7 @@ class Trajectory:
         )
         with atomic_file(checks.path(path)) as partial:
             table = pyarrow.table(columns, schema=schema)
-            parquet.write_table(table, partial, write_page_checksum=True)
+            parquet.write_table(table, partial, use_dictionary=False, write_page_checksum=True)
 
     @classmethod
     def from_parquet(cls, path: str | Path) -> Trajectory:
