@@ -27,7 +27,6 @@ from baselines.commands.terminal import (
     Job,
     check_writable,
     failure_lines,
-    processes,
     progress,
     run,
 )
@@ -37,6 +36,7 @@ from baselines.evaluation.figures import learning_figure, save_figure
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.statistics import paired_difference
 from baselines.evaluation.tables import markdown_table
+from baselines.evaluation.workers import processes
 from baselines.rl.onnx_policy import table1_means
 from baselines.rl.validation import VALIDATION, VALIDATION_SEEDS, drive
 from crane_env import CraneParameters

@@ -17,7 +17,6 @@ from baselines.commands.terminal import (
     FailedError,
     Job,
     failure_lines,
-    processes,
     progress,
     run,
     table_console,
@@ -27,6 +26,7 @@ from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.gallery import draw_gallery
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.tables import operator_table, summary_table
+from baselines.evaluation.workers import processes
 from baselines.mpc.settings import MpcSettings
 from crane_env import CraneParameters
 from crane_env.operators.table1 import TABLE_1

@@ -18,7 +18,6 @@ from baselines.commands.terminal import (
     Job,
     check_writable,
     failure_lines,
-    processes,
     progress,
     run,
     table_console,
@@ -26,6 +25,7 @@ from baselines.commands.terminal import (
 from baselines.evaluation.comparison import check_controllers
 from baselines.evaluation.gallery import draw_gallery
 from baselines.evaluation.results import EpisodeResult, write_json
+from baselines.evaluation.workers import processes
 from baselines.paper.checks import PAPER_MPCS
 from baselines.paper.evidence import Evidence, measured_indices
 from baselines.paper.report import (

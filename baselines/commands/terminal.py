@@ -23,7 +23,6 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from baselines.evaluation.results import EpisodeResult
-from baselines.evaluation.workers import available_cores
 from crane_env.support.atomic_file import PARTIAL_SUFFIX
 from crane_env.support.extras import require
 
@@ -33,9 +32,6 @@ if TYPE_CHECKING:
 
 LOG_WIDTH = 120
 """Width of the tables where there is no terminal [characters]."""
-
-MOST_JOBS = 16
-"""Processes a core; each uses a core fully."""
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
 """Signals that interrupt a command."""
@@ -136,24 +132,6 @@ def interruptible() -> Iterator[None]:
         for number, handler in before.items():
             if signal.getsignal(number) is _interrupt_once:
                 signal.signal(number, handler)
-
-
-def processes(jobs: int | None) -> int:
-    """Number of processes that `--jobs` asks for; None asks for one a core.
-
-    Raises:
-        ValueError: less than 1, or so many that they would only stand in each other's way.
-    """
-    cores = available_cores()
-    if jobs is None:
-        return cores
-    if jobs < 1:
-        raise ValueError(f"jobs must be at least 1, not {jobs}.")
-    if jobs > MOST_JOBS * cores:
-        raise ValueError(
-            f"jobs must be at most {MOST_JOBS * cores}, {MOST_JOBS} a core, not {jobs}."
-        )
-    return jobs
 
 
 def check_writable(what: str, file: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from datetime import UTC, datetime
 from time import perf_counter
 from typing import Any
@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.evaluation.episode_spec import EpisodeSpec, build_controller
+from baselines.evaluation import foreign_code
+from baselines.evaluation.episode_spec import EpisodeSpec, build_controller, check_settings
 from baselines.evaluation.provenance import git_state, machine, package_versions
 from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
-from baselines.evaluation.workers import Task, play_all
+from baselines.evaluation.workers import Task, play_all, processes
+from crane_env.support.factory import FactoryError
 
 MANIFEST_FORMAT = "oilcrane-manifest-1"
 """Version of the manifest's layout."""
@@ -24,12 +26,26 @@ MANIFEST_FORMAT = "oilcrane-manifest-1"
 def check_controllers(specs: Sequence[EpisodeSpec]) -> None:
     """Builds every controller once, so that what is wrong with one is known before it is played.
 
+    A factory of the user's own that raises costs its own episodes only, if there are others.
+
     Raises:
-        ValueError: an unknown controller, or settings that it refuses.
+        ValueError: an unknown controller, settings that it refuses or that none takes, a factory
+            that makes no controller, or only factories that raise.
         ImportError: a package is missing; the message names the extra that brings it.
     """
-    for spec in {(spec.controller, spec.setup.key): spec for spec in specs}.values():
-        build_controller(spec)
+    foreign_code.forget()
+    check_settings(specs)
+    distinct = {(spec.controller, spec.setup.key): spec for spec in specs}.values()
+    raised: list[FactoryError] = []
+    for spec in distinct:
+        try:
+            build_controller(spec)
+        except FactoryError as error:
+            if error.__cause__ is None:  # nothing was raised: it made something else
+                raise
+            raised.append(error)
+    if raised and len(raised) == len(distinct):
+        raise raised[0]
 
 
 def compare(
@@ -58,12 +74,25 @@ def compare(
         The results in the order of `specs`; an episode that raised is a failed one among them.
 
     Raises:
-        ValueError: `jobs` is below 1.
-        OSError: the folder cannot be written.
+        ValueError: `jobs` makes no sense, see `processes`.
+        OSError: the folder cannot be written, was deleted meanwhile, or another run writes to it;
+            what finished is kept.
     """
-    if jobs < 1:
-        raise ValueError(f"jobs must be at least 1, not {jobs}.")
+    jobs = processes(jobs)
     folder.prepare()
+    foreign_code.forget()
+    with folder.locked():
+        return _compare(specs, folder, jobs, keep, command, on_result)
+
+
+def _compare(
+    specs: Sequence[EpisodeSpec],
+    folder: ResultsFolder,
+    jobs: int,
+    keep: Keep,
+    command: Sequence[str],
+    on_result: Callable[[EpisodeResult], None],
+) -> list[EpisodeResult]:
     results: dict[str, EpisodeResult] = {}
     start = perf_counter()
     facts: dict[str, Any] = {
@@ -77,14 +106,13 @@ def compare(
     }
 
     def write_manifest(status: str) -> None:
-        folder.write_manifest(
-            {
-                **facts,
-                "status": status,
-                "duration": perf_counter() - start,
-                **_episodes(specs, results, folder),
-            }
-        )
+        told = {"status": status, "duration": perf_counter() - start}
+        folder.write_manifest({**facts, **told, **_episodes(specs, results, folder)})
+
+    def conclude(status: str) -> None:
+        folder.check_kept(result.spec for result in results.values() if result.metrics is not None)
+        folder.write_metrics(results[spec.key] for spec in specs if spec.key in results)
+        write_manifest(status)
 
     def finish(result: EpisodeResult) -> None:
         results[result.spec.key] = result
@@ -93,7 +121,6 @@ def compare(
     # A summary of other episodes must not stand beside this manifest, should nothing more come.
     folder.remove_summary()
     write_manifest("running")
-    status = "interrupted"
     try:
         for spec in specs:
             if (kept := folder.load_episode(spec, keep)) is not None:
@@ -104,14 +131,15 @@ def compare(
         with closing(play_all(tasks, jobs)) as played:
             for result in played:
                 finish(result)
-        failed = any(result.metrics is None for result in results.values())
-        status = "failed" if failed else "complete"
-    finally:
+    except BaseException as error:
         for spec in specs:  # workers may have finished more than they could tell
             if spec.key not in results and (kept := folder.load_episode(spec, keep)) is not None:
                 results[spec.key] = kept
-        folder.write_metrics(results[spec.key] for spec in specs if spec.key in results)
-        write_manifest(status)
+        with suppress(OSError):  # the error that ended it says more
+            conclude("failed" if isinstance(error, OSError) else "interrupted")
+        raise
+    failed = any(result.metrics is None for result in results.values())
+    conclude("failed" if failed else "complete")
     return [results[spec.key] for spec in specs]
 
 

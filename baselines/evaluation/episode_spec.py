@@ -10,24 +10,26 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
-import importlib.util
+import itertools
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 
+from baselines.evaluation import foreign_code
 from baselines.evaluation.provenance import code_identity
 from baselines.mpc.settings import MpcSettings
-from baselines.registry import CONTROLLERS, make_controller, settings_type
+from baselines.registry import make_controller, settings_type
 from crane_env import CraneParameters, Trajectory, run_episode
 from crane_env.controller import Controller
-from crane_env.operators.registry import FAMILIES, operator_program
-from crane_env.support.checks import seed as checked_seed
-from crane_env.support.checks import whole
-from crane_env.support.factory import is_place
+from crane_env.operators.registry import operator_program
+from crane_env.stage_cost import StageCost
+from crane_env.support import checks
+
+MOST_EPISODES = 1_000_000
+"""More take longer than anybody waits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +56,9 @@ class Setup:
         if self.nominal == self.crane:
             object.__setattr__(self, "nominal", None)
         if self.max_steps is not None:
-            object.__setattr__(self, "max_steps", whole("max_steps", self.max_steps, least=1))
+            object.__setattr__(
+                self, "max_steps", checks.whole("max_steps", self.max_steps, least=1)
+            )
 
     @property
     def believed(self) -> CraneParameters:
@@ -87,12 +91,24 @@ class EpisodeSpec:
             be there any more.
         seed: of the environment's reset.
         setup: crane, settings and length.
+
+    Raises:
+        ValueError: `seed` is none.
     """
 
     controller: str
     operator: Mapping[str, Any]
     seed: int
     setup: Setup
+
+    def __post_init__(self) -> None:
+        """Refuses what is no seed."""
+        object.__setattr__(self, "seed", checks.seed(self.seed))
+
+    @property
+    def foreign(self) -> tuple[str, ...]:
+        """Controller and operator, as far as they are the user's own."""
+        return foreign_code.foreign((self.controller, self.operator_name))
 
     @property
     def operator_name(self) -> str:
@@ -102,9 +118,19 @@ class EpisodeSpec:
     @functools.cached_property
     def key(self) -> str:
         """Digest of the specification and the code, 12 hexadecimal digits."""
-        own = [factory_identity(name) for name in (self.controller, self.operator_name)]
+        sources = [foreign_code.sources(name) for name in self.foreign]
         given = [self.controller, self.operator, self.seed, self.setup.key]
-        return digest([own, given])[:12]
+        return digest([sources, given])[:12]
+
+    def read(self) -> str | None:
+        """Digest of all that the user's own code may read; None if that is not known.
+
+        Empty for the registries' controllers and operators.
+        """
+        read = [foreign_code.readable(name) for name in self.foreign]
+        if None in read:
+            return None
+        return digest(read) if read else ""
 
     @classmethod
     def of(cls, mapping: Mapping[str, Any]) -> EpisodeSpec:
@@ -124,16 +150,24 @@ def episode_specs(
         setup: what all episodes have in common.
 
     Raises:
-        ValueError: an unknown operator, a malformed script, a seed out of range, nothing to play.
+        ValueError: an unknown operator, a malformed script, something that is no seed, nothing to
+            play, or more than `MOST_EPISODES` episodes.
         FileNotFoundError: a script that is not there.
     """
+    names = list(dict.fromkeys(controllers))
     programs = [operator_program(name) for name in dict.fromkeys(operators)]
-    distinct_seeds = list(dict.fromkeys(map(checked_seed, seeds)))
+    # A range of seeds may be longer than there is memory.
+    some = dict.fromkeys(map(checks.seed, itertools.islice(seeds, MOST_EPISODES + 1)))
+    if len(names) * len(programs) * len(some) > MOST_EPISODES:
+        raise ValueError(
+            f"There may be at most {MOST_EPISODES} episodes: ask for fewer seeds, operators or "
+            "controllers."
+        )
     specs = [
-        EpisodeSpec(controller=controller, operator=program, seed=seed, setup=setup)
-        for controller in dict.fromkeys(controllers)
+        EpisodeSpec(controller=name, operator=program, seed=seed, setup=setup)
+        for name in names
         for program in programs
-        for seed in distinct_seeds
+        for seed in some
     ]
     if not specs:
         raise ValueError("There is nothing to play: name a controller, an operator and a seed.")
@@ -144,48 +178,66 @@ def play(spec: EpisodeSpec) -> Trajectory:
     """Plays an episode.
 
     The controller answers once before it is reset and timed, so that act times contain no
-    compilation and no first touch of memory.
+    compilation and no first touch of memory. Environments, and controllers of the registry, are
+    used again for the next episode: their reset forgets all, which foreign ones' may not.
 
     Raises:
         ValueError: the specification asks for something that there is not.
         ImportError: a package is missing; the message names the extra that brings it.
     """
-    setup = spec.setup
-    controller = build_controller(spec)
-    env = gymnasium.make(
-        "OILCrane-v0",
-        operator=spec.operator,
-        parameters=setup.crane,
-        cost=setup.settings.cost,
-    )
+    setup, options = spec.setup, {"operator": spec.operator}
     try:
-        observation, _ = env.reset(seed=spec.seed)
+        controller = build_controller(spec) if spec.foreign else _controller(spec.controller, setup)
+        env = _environment(setup.crane, setup.settings.cost)
+        observation, _ = env.reset(seed=spec.seed, options=options)
         controller.act(observation)
-        return run_episode(env, controller, seed=spec.seed, max_steps=setup.max_steps)
-    finally:
-        env.close()
+        return run_episode(
+            env, controller, seed=spec.seed, options=options, max_steps=setup.max_steps
+        )
+    except BaseException:  # whatever it left them in, nothing is used again
+        _environment.cache_clear()
+        _controller.cache_clear()
+        raise
 
 
 def build_controller(spec: EpisodeSpec) -> Controller:
-    """The controller of an episode; the setup's settings are for those that take `MpcSettings`.
+    """A new controller of an episode; the setup's settings are for those that take `MpcSettings`.
 
     Raises:
         ValueError, ImportError: as `make_controller`.
     """
-    name, setup = spec.controller, spec.setup
+    return _controller.__wrapped__(spec.controller, spec.setup)
+
+
+def check_settings(specs: Iterable[EpisodeSpec]) -> None:
+    """Makes sure that no setup has settings which nothing in its episodes reads.
+
+    Raises:
+        ValueError: settings for controllers that take none, unknown controllers.
+        ImportError: a package is missing.
+    """
+    takers: dict[Setup, set[str]] = {}
+    for spec in specs:
+        takers.setdefault(spec.setup, set()).add(spec.controller)
+    for setup, names in takers.items():
+        # The cost is the reward's too.
+        read = dataclasses.replace(setup.settings, cost=StageCost()) == MpcSettings()
+        if not read and not any(settings_type(name) is MpcSettings for name in names):
+            raise ValueError(
+                f"None of the controllers {', '.join(sorted(names))} takes settings of the optimal "
+                "control problem, but some were given."
+            )
+
+
+@functools.lru_cache(maxsize=8)
+def _controller(name: str, setup: Setup) -> Controller:
     settings = setup.settings if settings_type(name) is MpcSettings else None
     return make_controller(name, parameters=setup.believed, settings=settings)
 
 
-@functools.cache
-def factory_identity(name: str) -> str:
-    """Digest of the file of a factory that is the user's own; empty for the registries' names."""
-    if name in CONTROLLERS or not is_place(name) or name.partition(":")[0] in FAMILIES:
-        return ""
-    found = importlib.util.find_spec(name.partition(":")[0])
-    if found is None or found.origin is None:
-        return ""
-    return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()
+@functools.lru_cache(maxsize=4)
+def _environment(crane: CraneParameters, cost: StageCost) -> gymnasium.Env[Any, Any]:
+    return gymnasium.make("OILCrane-v0", parameters=crane, cost=cost)
 
 
 def digest(data: Any) -> str:

@@ -1,30 +1,35 @@
 """Results on disk: a folder of finished episodes, the table of their metrics and a manifest.
 
     manifest.json        what was run, with which code, and how each episode ended
-    metrics.parquet      one row a finished episode
+    metrics.parquet      one row a finished episode; nan where the index is not defined
     figures/             drawings, if any
     episodes/SETUP/      a folder for each setup and state of the code, named by its key:
         CONTROLLER_OPERATOR_SEED_KEY.parquet     trajectory
-        CONTROLLER_OPERATOR_SEED_KEY.json        specification and metrics
+        CONTROLLER_OPERATOR_SEED_KEY.json        specification and metrics, with checksums
 
 An episode is finished when its JSON file is there; it is written last. Every file is written under
-another name and then renamed, so that what is there is whole, whenever the program is stopped.
-Episodes of different setups never meet in one folder, nor in one table.
+another name and then renamed, so that what is there is whole, whenever the program is stopped. What
+became broken since is noticed by its checksum and played again. An episode that failed, because
+something raised or the simulation diverged, is in the manifest only: it has no row. Episodes of
+different setups never meet in one folder, nor in one table, nor do two runs at a time.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import math
+import os
 import re
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from baselines.evaluation.episode_spec import EpisodeSpec
+from baselines.evaluation.episode_spec import EpisodeSpec, digest
 from crane_env.episode.metrics import Metrics
 from crane_env.episode.trajectory import Trajectory
 from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file
@@ -35,6 +40,9 @@ METRICS_FORMAT = "oilcrane-metrics-1"
 
 PARTIAL_AGE = 60.0
 """A file still being written after this time belongs to a process that was killed [s]."""
+
+NAME_LENGTH = 40
+"""So many characters of a controller's or operator's name go into a file name."""
 
 Keep = Literal["trajectories", "metrics"]
 """What is kept of an episode: its trajectory and metrics (about 0.2 MB), or metrics only."""
@@ -106,50 +114,85 @@ class ResultsFolder:
             OSError: the folder cannot be written; the message says which and why.
         """
         require("pyarrow.parquet", extra="results")
-        try:
+        with self._writing():
             (self.path / "episodes").mkdir(parents=True, exist_ok=True)
-            probe = self.path / "episodes" / f".probe{PARTIAL_SUFFIX}"
-            probe.touch()
-            probe.unlink()
-        except OSError as error:
-            raise OSError(
-                f"The output folder {str(self.path)!r} cannot be written: {error.strerror}."
-            ) from error
+            with atomic_file(self.path / "episodes" / ".probe") as probe:
+                pass
+            probe.with_name(".probe").unlink()
         for partial in self.path.rglob(f".*{PARTIAL_SUFFIX}"):
             if time.time() - partial.stat().st_mtime > PARTIAL_AGE:
                 partial.unlink(missing_ok=True)
 
     def save_episode(
-        self, spec: EpisodeSpec, trajectory: Trajectory, wall_time: float, keep: Keep
+        self,
+        spec: EpisodeSpec,
+        trajectory: Trajectory,
+        wall_time: float,
+        keep: Keep,
+        read: str | None = "",
     ) -> Metrics:
         """Keeps a finished episode and returns its metrics.
 
+        Args:
+            spec: the episode.
+            trajectory: what was recorded.
+            wall_time: how long it took [s].
+            keep: what is kept of it.
+            read: digest of all that foreign code could read when it was played; None if that is
+                not known.
+
         Raises:
-            OSError: a file cannot be written.
+            OSError: a file cannot be written, or the folder is gone.
         """
         metrics = trajectory.metrics()
-        self.record_file(spec).parent.mkdir(parents=True, exist_ok=True)
-        if keep == "trajectories":
-            trajectory.to_parquet(self.trajectory_file(spec))
-        record = {
+        record: dict[str, Any] = {
             "spec": dataclasses.asdict(spec),
             "metrics": _nan_to_none(metrics.as_dict()),
             "wall_time": wall_time,
+            "read": read,
         }
-        write_json(self.record_file(spec), record)
+        with self._writing():
+            # Not its parents: a folder that was deleted meanwhile must be noticed.
+            self.record_file(spec).parent.mkdir(exist_ok=True)
+            if keep == "trajectories":
+                trajectory.to_parquet(self.trajectory_file(spec))
+                record["trajectory"] = file_digest(self.trajectory_file(spec))
+            write_json(self.record_file(spec), {**record, "checksum": digest(record)})
         return metrics
 
     def load_episode(self, spec: EpisodeSpec, keep: Keep) -> EpisodeResult | None:
-        """A finished episode; None if there is none, or not all of it, or it cannot be read."""
+        """A finished episode; None if there is none, not all of it, or if it is broken.
+
+        None too if it was played by foreign code that may have read something else than it would
+        now.
+        """
         try:
             record = json.loads(self.record_file(spec).read_text(encoding="utf-8"))
-            metrics = Metrics(**_none_to_nan(record["metrics"]))
-            wall_time = float(record["wall_time"])
+            if record.pop("checksum") != digest(record):
+                return None
             if keep == "trajectories":
-                self.trajectory(spec)
-        except (OSError, ValueError, KeyError, TypeError):
+                kept = record["trajectory"] == file_digest(self.trajectory_file(spec))
+                if not kept:
+                    return None
+            metrics = Metrics(**_none_to_nan(record["metrics"]))
+            found = EpisodeResult(spec, metrics, float(record["wall_time"]))
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
-        return EpisodeResult(spec, metrics, wall_time)
+        read = record["read"]
+        return found if read is not None and read == spec.read() else None
+
+    def check_kept(self, specs: Iterable[EpisodeSpec]) -> None:
+        """Makes sure that what was kept has not been deleted since.
+
+        Raises:
+            OSError: it has.
+        """
+        gone = sum(not self.record_file(spec).is_file() for spec in specs)
+        if gone:
+            raise OSError(
+                f"The output folder {str(self.path)!r} lacks {gone} episodes that this run kept in "
+                "it: they were deleted meanwhile, and the same command plays them again."
+            )
 
     def trajectory(self, spec: EpisodeSpec) -> Trajectory:
         """Trajectory of a finished episode.
@@ -158,6 +201,33 @@ class ResultsFolder:
             FileNotFoundError: it was not played, or only its metrics were kept.
         """
         return Trajectory.from_parquet(self.trajectory_file(spec))
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keeps other runs out of the folder, where the system can, until the block ends.
+
+        Raises:
+            OSError: another run is writing to it.
+        """
+        try:
+            import fcntl
+        except ImportError:
+            yield
+            return
+        descriptor = os.open(self.path, os.O_RDONLY)
+        try:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise OSError(
+                    f"Another run is writing to {str(self.path)!r}: wait for it, or give another "
+                    "output folder."
+                ) from None
+            except OSError:  # a file system without locks
+                pass
+            yield
+        finally:
+            os.close(descriptor)
 
     def write_metrics(self, results: Iterable[EpisodeResult]) -> None:
         """Writes the table of metrics of the episodes that finished.
@@ -223,14 +293,21 @@ class ResultsFolder:
         folders = sorted((self.path / "episodes").iterdir())
         return [folder for folder in folders if folder.is_dir() and folder.name not in own]
 
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Says in one sentence which folder could not be written, and why."""
+        try:
+            yield
+        except OSError as error:
+            raise OSError(
+                f"The output folder {str(self.path)!r} cannot be written: "
+                f"{error.strerror or error}."
+            ) from error
+
     def _episode_file(self, spec: EpisodeSpec, ending: str) -> Path:
         words = (spec.controller, spec.operator_name, str(spec.seed))
         readable = "_".join(re.sub(r"[^A-Za-z0-9.]+", "-", word)[-NAME_LENGTH:] for word in words)
         return self.path / "episodes" / spec.setup.key / f"{readable}_{spec.key}{ending}"
-
-
-NAME_LENGTH = 40
-"""So many characters of a controller's or operator's name go into a file name."""
 
 
 def write_json(path: Path, data: Any) -> None:
@@ -242,6 +319,15 @@ def write_json(path: Path, data: Any) -> None:
     text = json.dumps(data, indent=1, allow_nan=False)
     with atomic_file(path) as partial:
         partial.write_text(text + "\n", encoding="utf-8")
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal digits.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _nan_to_none(values: dict[str, float]) -> dict[str, float | None]:

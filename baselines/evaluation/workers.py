@@ -9,6 +9,7 @@ reaches this process alone, which then stops them.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import multiprocessing
 import os
 import signal
@@ -25,8 +26,12 @@ from typing import Any, NoReturn
 import baselines
 import crane_env
 from baselines.evaluation.episode_spec import EpisodeSpec, play
+from baselines.evaluation.foreign_code import Reads
 from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
+from crane_env import Trajectory
+from crane_env.support import checks
 from crane_env.support.extras import require
+from crane_env.support.factory import FactoryError, line_of
 
 ONE_THREAD = dict.fromkeys(
     (
@@ -42,6 +47,9 @@ ONE_THREAD = dict.fromkeys(
 
 EPISODE_TIME_MAX = 3600.0
 """An episode that takes longer hangs [s]; the slowest solver here needs four minutes."""
+
+MOST_JOBS = 16
+"""Processes a core; each uses a core fully."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +82,21 @@ def available_cores() -> int:
     return os.cpu_count() or 1
 
 
+def processes(jobs: int | None) -> int:
+    """Number of processes that are asked for; None asks for one a core.
+
+    Raises:
+        ValueError: less than 1, or so many that they would only stand in each other's way.
+    """
+    cores = available_cores()
+    number = checks.whole("jobs", cores if jobs is None else jobs, least=1)
+    if number > MOST_JOBS * cores:
+        raise ValueError(
+            f"jobs must be at most {MOST_JOBS * cores}, {MOST_JOBS} a core, not {number}."
+        )
+    return number
+
+
 def play_all(
     tasks: Sequence[Task], jobs: int, episode_time_max: float = EPISODE_TIME_MAX
 ) -> Generator[EpisodeResult, None, None]:
@@ -89,6 +112,7 @@ def play_all(
 
     Raises:
         ImportError: pebble is missing; the message names the extra.
+        OSError: an episode that was played cannot be kept.
     """
     pebble = require("pebble", extra="results")
     with environment(ONE_THREAD):
@@ -118,40 +142,67 @@ def play_all(
 
 
 def perform(task: Task) -> EpisodeResult:
-    """Plays and keeps an episode; whatever it raises is the result."""
-    start = perf_counter()
+    """Plays and keeps an episode; whatever playing it raises is the result.
+
+    Raises:
+        OSError: it cannot be kept, and neither could another.
+    """
+    # Between two episodes the pool's own handler serves, which raises nothing.
+    before = signal.signal(signal.SIGTERM, leave)
     try:
-        # A fresh specification: the key that came with this one is the parent's.
-        own = dataclasses.replace(task.spec, setup=dataclasses.replace(task.spec.setup))
-        if own.key != task.key:
-            raise RuntimeError("the code changed while the comparison was running")
-        trajectory = play(task.spec)
-        if trajectory.simulation_failed:
-            raise RuntimeError(f"the simulation diverged after {trajectory.time[-1]:.2f} s")
-        wall_time = perf_counter() - start
-        metrics = ResultsFolder(task.folder).save_episode(
-            task.spec, trajectory, wall_time, task.keep
-        )
+        played = attempt(task)
+        if isinstance(played, EpisodeResult):
+            return played
+        trajectory, wall_time, read = played
+        folder = ResultsFolder(task.folder)
+        metrics = folder.save_episode(task.spec, trajectory, wall_time, task.keep, read)
+        return EpisodeResult(task.spec, metrics, wall_time)
     except StoppedError as stopped:
         os._exit(stopped.code)
-    except (Exception, SystemExit) as error:  # a result, not the end of the comparison
-        return EpisodeResult(
-            task.spec,
-            None,
-            perf_counter() - start,
-            failure=f"{type(error).__name__}: {error}",
-            traceback=traceback.format_exc(),
-        )
-    return EpisodeResult(task.spec, metrics, wall_time)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def attempt(task: Task) -> tuple[Trajectory, float, str | None] | EpisodeResult:
+    """Trajectory, duration [s] and digest of what foreign code could read; or why there is none."""
+    start = perf_counter()
+
+    def failed(why: str, trace: str = "") -> EpisodeResult:
+        return EpisodeResult(task.spec, None, perf_counter() - start, failure=why, traceback=trace)
+
+    # A fresh specification: the key that came with this one is the parent's.
+    spec = dataclasses.replace(task.spec, setup=dataclasses.replace(task.spec.setup))
+    try:
+        if spec.key != task.key:
+            return failed("The code changed while the comparison was running.")
+        read = spec.read()
+        with reads().noted(bool(spec.foreign)):
+            trajectory = play(spec)
+    except StoppedError:
+        raise
+    except FactoryError as error:
+        return failed(str(error), traceback.format_exc())
+    except BaseException as error:  # sys.exit too: a result, not the end of the comparison
+        sentence = " ".join(f"{type(error).__name__}: {error}".split())
+        return failed(f"{sentence} ({line_of(error)})", traceback.format_exc())
+    if trajectory.simulation_failed:
+        return failed(f"The simulation diverged after {trajectory.time[-1]:.6g} s.")
+    elsewhere = reads().elsewhere(spec.foreign)
+    return trajectory, perf_counter() - start, None if elsewhere else read
+
+
+@functools.cache
+def reads() -> Reads:
+    """What foreign code was seen to read in this process."""
+    return Reads()
 
 
 def prepare(paths: Sequence[str]) -> None:
-    """Makes a fresh process a worker: the parent's modules, no output, an end in order.
+    """Makes a fresh process a worker: with the parent's modules, without its output.
 
     Args:
         paths: where modules are found.
     """
-    signal.signal(signal.SIGTERM, leave)
     sys.path[:] = paths
     if sys.stdout and sys.stderr:  # solvers print to standard output, which is the parent's own
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())

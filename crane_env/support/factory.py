@@ -51,10 +51,11 @@ def placed_errors(what: str) -> Iterator[None]:
     except (Exception, SystemExit) as error:
         kind = ImportError if isinstance(error, ImportError) else FactoryError
         sentence = " ".join(f"{type(error).__name__}: {error}".split())
-        raise kind(f"The {what} fails with {sentence} ({_line_of(error)}).") from error
+        raise kind(f"The {what} fails with {sentence} ({line_of(error)}).") from error
 
 
-def _line_of(error: BaseException) -> str:
+def line_of(error: BaseException) -> str:
+    """File and line where an error arose, in a user's own code if it went through any."""
     if isinstance(error, SyntaxError) and error.filename:
         return f"{error.filename}, line {error.lineno}"
     frames = traceback.extract_tb(error.__traceback__)

@@ -191,9 +191,9 @@ BAD_INPUT = {
     "list": (("--settings", "[1]"), "settings must be a JSON object or a file with one, not '[1]'"),
     "horizon": (("--settings", '{"control_horizon": 200}'), "must not exceed prediction_horizon"),
     "seed": (("--seeds", "one"), "A seed is a whole number or a range FIRST:END, not 'one'"),
-    "negative": (("--seeds=-1",), "A seed is a whole number of at least 0, not -1"),
+    "negative": (("--seeds=-1",), "A seed must be a whole number of at least 0"),
     "none": (("--seeds", "3:3"), "nothing to play"),
-    "jobs": (("--jobs", "0"), "jobs must be at least 1, not 0"),
+    "jobs": (("--jobs", "0"), "jobs must be a whole number of at least 1, not 0"),
     "steps": (("--max-steps", "0"), "max_steps must be a whole number of at least 1, not 0"),
 }
 

@@ -86,6 +86,10 @@ def raising(crane: CraneParameters, settings: MpcSettings) -> Raising:
     return Raising()
 
 
+def unbuildable(crane: CraneParameters) -> Stub:
+    raise LookupError("nothing to build of")
+
+
 def dying(crane: CraneParameters, settings: MpcSettings) -> Dying:
     return Dying()
 

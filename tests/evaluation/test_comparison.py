@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import re
 import time
 from pathlib import Path
 
@@ -126,7 +127,7 @@ def test_code_that_changes_while_the_comparison_runs_fails_the_episode(
 ) -> None:
     monkeypatch.setattr(baselines.evaluation.episode_spec, "code_identity", lambda: "before")
     (result,) = compare(specs_of("manual"), ResultsFolder(tmp_path), jobs=1)
-    assert result.failure == "RuntimeError: the code changed while the comparison was running"
+    assert result.failure == "The code changed while the comparison was running."
     assert not list(tmp_path.glob("episodes/*/*"))
 
 
@@ -166,8 +167,8 @@ def test_an_operator_of_ones_own_is_played_and_its_code_is_in_the_key() -> None:
     again = EpisodeSpec.of(json.loads(json.dumps(dataclasses.asdict(spec))))
     assert again == spec
     assert play(again).travel_reference.any()
-    assert baselines.evaluation.episode_spec.factory_identity(spec.operator_name)
-    assert not baselines.evaluation.episode_spec.factory_identity("random")
+    assert spec.foreign == (spec.operator_name,)
+    assert specs_of("manual", operators=("random",))[0].read() == "" != spec.read()
 
 
 def test_every_part_of_a_specification_changes_its_key() -> None:
@@ -204,18 +205,25 @@ def test_a_script_is_part_of_the_specification_and_its_file_need_not_stay(tmp_pa
 def test_an_episode_that_raises_is_reported_and_the_others_finish(tmp_path: Path) -> None:
     folder = ResultsFolder(tmp_path)
     specs = specs_of(f"{STUBS}:raising", "manual", operators=("table1:1", "table1:5"))
+    specs += specs_of(f"{STUBS}:unbuildable")
+    check_controllers(specs)  # what raises costs its own episodes only
     results = compare(specs, folder, jobs=2)
     # Manoeuvre 5 does not travel within the episode, so that `raising` finishes it.
-    assert [result.status for result in results] == ["failed", "finished", "finished", "finished"]
-    assert results[0].failure == "ArithmeticError: no plan for this"
-    assert "stub_controllers.py" in results[0].traceback
+    assert [result.status for result in results] == ["failed", *["finished"] * 3, "failed"]
+    stubs = str(Path(__file__).with_name("stub_controllers.py"))
+    assert re.fullmatch(
+        rf"ArithmeticError: no plan for this \({stubs}, line \d+\)", results[0].failure
+    )
+    assert re.search(rf"LookupError: nothing to build of \({stubs}, line", results[-1].failure)
     manifest = folder.read_manifest()
     assert manifest["status"] == "failed"
     assert manifest["episodes"][0]["failure"] == results[0].failure
     assert len(folder.read_metrics()) == 3
     assert index_values(results, "IAE")[f"{STUBS}:raising"]["table1:1"].size == 0
     again = compare(specs, folder, jobs=2)
-    assert [result.reused for result in again] == [False, True, True, True]
+    assert [result.reused for result in again] == [False, True, True, True, False]
+    with pytest.raises(ValueError, match=rf"nothing to build of \({stubs}, line"):
+        check_controllers(specs[-1:])
 
 
 def test_an_episode_whose_simulation_diverges_is_failed_and_in_no_mean(
@@ -226,7 +234,7 @@ def test_an_episode_whose_simulation_diverges_is_failed_and_in_no_mean(
     monkeypatch.setattr(baselines.evaluation.workers, "play", lambda _: diverged)
     result = perform(Task(spec, spec.key, tmp_path, "metrics"))
     assert result.status == "failed"
-    assert "the simulation diverged after 2.38 s" in result.failure
+    assert result.failure == "The simulation diverged after 2.38 s."
     assert index_values([result], "IAE")["manual"]["table1:1"].size == 0
 
 
@@ -239,6 +247,7 @@ def test_a_worker_that_dies_fails_its_episode_alone(tmp_path: Path) -> None:
 
 def test_a_worker_that_hangs_fails_its_episode_alone(tmp_path: Path) -> None:
     specs = specs_of("manual", f"{STUBS}:hanging")
+    ResultsFolder(tmp_path).prepare()
     tasks = [Task(spec, spec.key, tmp_path, "metrics") for spec in specs]
     played = play_all(tasks, 2, episode_time_max=15.0)
     failures = {result.spec.controller: result.failure for result in played}
@@ -253,7 +262,7 @@ def test_what_a_controller_prints_does_no_harm(tmp_path: Path) -> None:
 
 def test_a_worker_computes_in_one_thread(tmp_path: Path) -> None:
     (result,) = compare(specs_of(f"{STUBS}:threaded"), ResultsFolder(tmp_path), jobs=1)
-    assert result.failure == "RuntimeError: threads=1"
+    assert result.failure.startswith("RuntimeError: threads=1 (")
 
 
 def test_an_interrupted_comparison_keeps_what_finished_and_goes_on_from_there(
@@ -296,6 +305,15 @@ def test_a_damaged_or_incomplete_episode_is_played_again(tmp_path: Path) -> None
     results = compare(specs, folder, jobs=1)
     assert [result.reused for result in results] == [False, False, False, True]
     assert {result.status for result in results} == {"finished"}
+
+
+def test_what_a_worker_uses_again_plays_as_if_it_were_new() -> None:
+    specs = specs_of("adaptive", "nmpc-b-rti", operators=("random", "table1:1"))
+    used = [play(spec) for spec in [*specs, *specs[::-1]]][len(specs) :]
+    for spec, trajectory in zip(specs[::-1], used, strict=True):
+        baselines.evaluation.episode_spec._environment.cache_clear()
+        baselines.evaluation.episode_spec._controller.cache_clear()
+        assert same_motion(trajectory, play(spec))
 
 
 def test_metrics_alone_can_be_kept_and_do_not_pass_for_trajectories(tmp_path: Path) -> None:
@@ -422,7 +440,7 @@ def test_a_controller_may_believe_in_another_crane_than_it_drives() -> None:
 
 
 def test_nonsense_is_refused_with_what_is_allowed() -> None:
-    with pytest.raises(ValueError, match="jobs must be at least 1, not 0"):
+    with pytest.raises(ValueError, match="jobs must be a whole number of at least 1, not 0"):
         compare(specs_of("manual"), ResultsFolder(Path("unused")), jobs=0)
     with pytest.raises(ValueError, match="at least 1, not 0"):
         Setup(max_steps=0)
@@ -432,6 +450,13 @@ def test_nonsense_is_refused_with_what_is_allowed() -> None:
         episode_specs(["manual"], ["random"], [1, -3], SHORT)
     with pytest.raises(ValueError, match="below 9223372036854775808"):
         episode_specs(["manual"], ["random"], [2**63], SHORT)
+    with pytest.raises(ValueError, match="jobs must be at most"):
+        compare(specs_of("manual"), ResultsFolder(Path("unused")), jobs=10_000)
+    with pytest.raises(ValueError, match="at most 1000000 episodes"):
+        episode_specs(["manual"], ["random"], range(10**12), SHORT)
+    tuned = dataclasses.replace(SHORT, settings=MpcSettings(control_horizon=5))
+    with pytest.raises(ValueError, match="None of the controllers manual takes settings"):
+        check_controllers(episode_specs(["manual"], ["random"], [0], tuned))
     with pytest.raises(ValueError, match="nothing to play"):
         episode_specs([], ["random"], [0], SHORT)
     with pytest.raises(ValueError, match="Unknown controller 'nobody'; valid: manual, linear"):
