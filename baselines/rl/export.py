@@ -34,7 +34,7 @@ from baselines.rl.checkpoint import (
 )
 from baselines.rl.onnx_policy import FORMAT, INPUT, OUTPUT, OnnxPolicy, description
 from baselines.rl.settings import ALGORITHMS, TrainingSettings
-from baselines.rl.trained import ModelsDrive, Trained, trained_model
+from baselines.rl.trained import Trained, trained_model
 from baselines.rl.validation import table1_indices
 from crane_env.episode.play import run_episode
 from crane_env.episode.trajectory import UNITS
@@ -175,7 +175,7 @@ def _try(policy: OnnxPolicy, trained: Trained) -> None:
     one = np.float32(limit / trained.acceleration_scale)
     crane = gymnasium.make("OILCrane-v0", operator="manoeuvre", parameters=trained.crane)
     env: Any = gymnasium.wrappers.RescaleAction(crane, -one, one)
-    driven = run_episode(env, ModelsDrive(trained), seed=0, max_steps=TRIAL_STEPS)
+    driven = run_episode(env, trained, seed=0, max_steps=TRIAL_STEPS)
     env.close()
     seen = np.stack([getattr(driven, name) for name in Observation._fields], axis=1)
     differences = np.abs(policy.accelerations(seen)[:, 0] - driven.action)

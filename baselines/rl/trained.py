@@ -37,8 +37,8 @@ else:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Trained:
-    """A model and what lies between it and the crane.
+class Trained(Controller):
+    """A model and what lies between it and the crane; drives its own environment.
 
     Attributes:
         model: trained on the crane.
@@ -65,29 +65,22 @@ class Trained:
                 f"(1,); this model has {shapes[0]} and {shapes[1]}."
             )
 
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def act(self, observation: NDArray[np.float64]) -> NDArray[Any]:
+        """The model's action, which its environment scales."""
+        seen: Any = observation
+        if self.normaliser is not None:
+            seen = self.normaliser.normalize_obs(seen)
+        action, _ = self.model.predict(seen, deterministic=True)
+        return action
+
     @property
     def acceleration_max(self) -> float:
         """Largest acceleration that the model can ask for [m/s^2]."""
         space: Any = self.model.action_space
         return self.acceleration_scale * float(space.high[0])
-
-
-class ModelsDrive(Controller):
-    """A model at the controls of its own environment."""
-
-    def __init__(self, trained: Trained) -> None:
-        self._trained = trained
-
-    def reset(self) -> None:
-        """Nothing to forget."""
-
-    def act(self, observation: NDArray[np.float64]) -> NDArray[Any]:
-        """The model's action, which the environment scales."""
-        seen: Any = observation
-        if self._trained.normaliser is not None:
-            seen = self._trained.normaliser.normalize_obs(seen)
-        action, _ = self._trained.model.predict(seen, deterministic=True)
-        return action
 
 
 def trained_model(
@@ -126,14 +119,15 @@ def trained_model(
             "another one, or behind a wrapper that is not exported (of Stable-Baselines3's and "
             "Gymnasium's, only VecNormalize is)."
         )
-    normaliser = None
-    if statistics is not None:
-        normaliser = _normaliser(statistics)
-    elif model._last_original_obs is not None:  # kept for those who train in a VecNormalize
+    normaliser = None if statistics is None else _normaliser(statistics)
+    inside = model._last_original_obs is not None  # kept for those who train in a VecNormalize
+    if inside and statistics is None:
         raise ValueError(
             "The model was trained in a VecNormalize: give the file of statistics that its save() "
             "wrote."
         )
+    if not inside and statistics is not None:
+        raise ValueError("The model was trained in no VecNormalize: give no statistics.")
     return dataclasses.replace(
         trained, acceleration_scale=limit if normalised else 1.0, normaliser=normaliser
     )

@@ -191,6 +191,8 @@ def test_what_is_no_model_or_no_statistics_is_refused(tmp_path: Path) -> None:
     model_on(crane(CraneParameters(), rescaled=False)).save(tmp_path / "model.zip")
     model_on(gymnasium.make("Pendulum-v1")).save(tmp_path / "pendulum.zip")
     (tmp_path / "text.zip").write_text("no model")
+    vector = DummyVecEnv([lambda: crane(CraneParameters(), rescaled=False)])
+    VecNormalize(vector).save(str(tmp_path / "whole.pkl"))
     (tmp_path / "list.pkl").write_bytes(pickle.dumps([]))
     with zipfile.ZipFile(tmp_path / "empty.zip", "w") as archive:
         archive.writestr("something", "else")
@@ -203,6 +205,7 @@ def test_what_is_no_model_or_no_statistics_is_refused(tmp_path: Path) -> None:
         ("model.zip", {"statistics": tmp_path / "none.pkl"}, "There is no file of statistics"),
         ("model.zip", {"statistics": tmp_path / "text.zip"}, "is not what VecNormalize.save"),
         ("model.zip", {"statistics": tmp_path / "list.pkl"}, "wrote: it holds a list"),
+        ("model.zip", {"statistics": tmp_path / "whole.pkl"}, "trained in no VecNormalize"),
     ):
         with pytest.raises((ValueError, FileNotFoundError), match=message):
             export_file(

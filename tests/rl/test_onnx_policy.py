@@ -252,3 +252,5 @@ def test_missing_extras_are_named() -> None:
     assert done.returncode == 2
     assert "pip install 'oilcrane[rl]'" in done.stderr
     assert "Traceback" not in done.stderr
+    adapting = run("import baselines.rl.sb3_vector_env", missing)
+    assert adapting.stderr.strip().endswith("pip install 'oilcrane[rl]'.")

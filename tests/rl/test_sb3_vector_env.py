@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -147,16 +145,3 @@ def test_attributes_and_methods_are_those_of_the_vector_environment() -> None:
         env.env_method("render")
     env.close()
     assert vector.closed
-
-
-def test_without_the_extra_the_import_says_what_to_install() -> None:
-    code = (
-        "import sys\n"
-        "sys.modules['stable_baselines3'] = None\n"
-        "import crane_env, gymnasium\n"
-        "gymnasium.make_vec('OILCrane-v0', num_envs=2).reset(seed=0)\n"
-        "import baselines.rl.sb3_vector_env\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
-    assert done.returncode != 0
-    assert done.stderr.strip().endswith("pip install 'oilcrane[rl]'.")
