@@ -45,6 +45,9 @@ ACCOUNTED_FOR = tuple(
 """Folders of which nothing counts as read from elsewhere: this project is part of every key, the
 libraries count by their versions."""
 
+METADATA = (".egg-info", ".dist-info")
+"""Folders about an installed distribution, wherever it lies; it counts by its version."""
+
 
 def foreign(names: Iterable[str]) -> tuple[str, ...]:
     """Those of the names of controllers and operators that are places of factories."""
@@ -113,7 +116,9 @@ class Reads:
         return sorted(
             path
             for path in paths - home
-            if not path.startswith(ACCOUNTED_FOR) and Path(path).is_file()
+            if not path.startswith(ACCOUNTED_FOR)
+            and not os.path.dirname(path).endswith(METADATA)  # noqa: PTH120
+            and Path(path).is_file()
         )
 
     def _note(self, event: str, arguments: tuple[Any, ...]) -> None:

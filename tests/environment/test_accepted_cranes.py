@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from crane_env.environment.single import OILCraneEnv
@@ -42,7 +42,8 @@ def test_it_hangs_at_rest_with_the_tension_of_the_weight(crane: CraneParameters)
     assert outcome.state.sway_angle == pytest.approx(0.0, abs=1e-9)
 
 
-@settings(max_examples=20, deadline=None)
+# Most of the widest cranes cannot hoist so far within the time that a test has.
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
 @given(cranes())
 def test_it_hoists_at_the_rate_commanded(crane: CraneParameters) -> None:
     """On the mean: an elastic cable swings about it by at most a tenth of its length."""

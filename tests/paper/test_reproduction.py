@@ -217,7 +217,7 @@ def test_the_data_is_plain_and_complete(reproduced: Reproduction) -> None:
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("--jobs", "0"), "jobs must be at least 1, not 0."),
+        (("--jobs", "0"), "jobs must be a whole number of at least 1, not 0."),
         (("--manoeuvres", "-1"), "manoeuvres must be 0 or at least 2"),
         (("--manoeuvres", "1"), "manoeuvres must be 0 or at least 2"),
         (("--output", "{file}"), "The output folder '{file}/defaults' cannot be written"),
