@@ -13,6 +13,7 @@ from importlib import import_module
 
 from baselines.commands.terminal import ended, interruptible, sentence
 from crane_env.support.checks import choice
+from crane_env.support.extras import missing
 
 PROGRAM = "oilcrane"
 
@@ -77,13 +78,7 @@ def run_command(name: str, arguments: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt:
             return ended(program, 130, "interrupted.")
         except ImportError as error:
-            missing = f"{error.name}" if error.name else str(error)
-            return ended(
-                program,
-                2,
-                f"This needs the package {missing!r}, which comes with an extra: "
-                f"pip install '{PROGRAM}[{command.extras}]'.",
-            )
+            return ended(program, 2, missing(error.name or str(error), command.extras))
         code: int = module.main(arguments)
     return code
 

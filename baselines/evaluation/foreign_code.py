@@ -19,6 +19,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any
 
@@ -80,8 +81,8 @@ def readable(name: str) -> str | None:
 
 def forget() -> None:
     """Looks at the files anew when asked next."""
-    sources.cache_clear()
-    readable.cache_clear()
+    for found in (_files, sources, readable):
+        found.cache_clear()
 
 
 class Reads:
@@ -136,10 +137,7 @@ def _source(path: str) -> str:
 
 def _places(name: str) -> list[Path]:
     """Home of a factory: folders, or one file where its folder is that of libraries."""
-    try:
-        found = importlib.util.find_spec(name.partition(":")[0].partition(".")[0])
-    except (ImportError, ValueError):
-        return []
+    found = _top_level(name)
     if found is None:
         return []
     if found.submodule_search_locations is not None:
@@ -151,10 +149,19 @@ def _places(name: str) -> list[Path]:
 
 
 def _origin(name: str) -> list[Path]:
-    found = importlib.util.find_spec(name.partition(":")[0].partition(".")[0])
+    found = _top_level(name)
     return [] if found is None or not found.has_location else [Path(str(found.origin))]
 
 
+def _top_level(name: str) -> ModuleSpec | None:
+    """The top-level package or module of a factory; None if there is none."""
+    try:
+        return importlib.util.find_spec(name.partition(":")[0].partition(".")[0])
+    except (ImportError, ValueError):
+        return None
+
+
+@functools.cache
 def _files(name: str) -> list[Path] | None:
     """Files of the home of a factory; None if they are too many to look through."""
     found: list[Path] = []

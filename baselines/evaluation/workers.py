@@ -31,7 +31,7 @@ from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
 from crane_env import Trajectory
 from crane_env.support import checks
 from crane_env.support.extras import require
-from crane_env.support.factory import FactoryError, line_of
+from crane_env.support.factory import FactoryError, told
 
 ONE_THREAD = dict.fromkeys(
     (
@@ -183,8 +183,7 @@ def attempt(task: Task) -> tuple[Trajectory, float, str | None] | EpisodeResult:
     except FactoryError as error:
         return failed(str(error), traceback.format_exc())
     except BaseException as error:  # sys.exit too: a result, not the end of the comparison
-        sentence = " ".join(f"{type(error).__name__}: {error}".split())
-        return failed(f"{sentence} ({line_of(error)})", traceback.format_exc())
+        return failed(told(error), traceback.format_exc())
     if trajectory.simulation_failed:
         return failed(f"The simulation diverged after {trajectory.time[-1]:.6g} s.")
     elsewhere = reads().elsewhere(spec.foreign)

@@ -264,8 +264,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         return {**self.__dict__, "recorder": None}
 
     def _read_buttons(self, state: CraneState) -> None:
-        time = self._step_index * self._parameters.control_period
-        buttons = self._operator.press(time, state)
+        buttons = self._operator.press(self.time, state)
         if buttons is not self._buttons:
             self._press(Buttons.of(buttons))
 

@@ -19,7 +19,12 @@ def require(module: str, *, extra: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        raise ImportError(
-            f"This needs the package {module.split('.')[0]!r}, which comes with an extra: "
-            f"pip install 'oilcrane[{extra}]'."
-        ) from error
+        raise ImportError(missing(module.split(".")[0], extra)) from error
+
+
+def missing(package: str, extra: str) -> str:
+    """What to do about a package that is not installed, in a sentence."""
+    return (
+        f"This needs the package {package!r}, which comes with an extra: "
+        f"pip install 'oilcrane[{extra}]'."
+    )

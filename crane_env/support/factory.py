@@ -50,8 +50,12 @@ def placed_errors(what: str) -> Iterator[None]:
         raise ImportError(f"The {what} cannot be imported: {error}.") from error
     except (Exception, SystemExit) as error:
         kind = ImportError if isinstance(error, ImportError) else FactoryError
-        sentence = " ".join(f"{type(error).__name__}: {error}".split())
-        raise kind(f"The {what} fails with {sentence} ({line_of(error)}).") from error
+        raise kind(f"The {what} fails with {told(error)}.") from error
+
+
+def told(error: BaseException) -> str:
+    """An error in one line: its type, what it says, and where it arose."""
+    return f"{' '.join(f'{type(error).__name__}: {error}'.split())} ({line_of(error)})"
 
 
 def line_of(error: BaseException) -> str:
