@@ -23,6 +23,8 @@ from crane_env.support.factory import FactoryError, found_at, is_place, placed_e
 CONTROLLERS: dict[str, str] = {
     "manual": "baselines.manual:manual",
     "linear": "baselines.mpc.linear:linear",
+    "linear-open-loop": "baselines.mpc.linear:linear_open_loop",
+    "linear-measured": "baselines.mpc.linear:linear_measured",
     "adaptive": "baselines.mpc.linear:adaptive",
     "nmpc-a": "baselines.mpc.nonlinear:nmpc_a",
     "nmpc-b": "baselines.mpc.nonlinear:nmpc_b",

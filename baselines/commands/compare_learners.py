@@ -93,7 +93,15 @@ class Options:
     """
 
     runs: Path = Path("results/train_rl")
-    controllers: tuple[str, ...] = ("linear", "adaptive", "nmpc-a", "nmpc-b", "ltv", "ppo", "sac")
+    controllers: tuple[str, ...] = (
+        "linear-measured",
+        "adaptive",
+        "nmpc-a",
+        "nmpc-b",
+        "ltv",
+        "ppo",
+        "sac",
+    )
     manoeuvres: int = 1000
     shifted_manoeuvres: int = 50
     output: Path = Path("results/compare_rl")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from baselines.controller import finite_observation
 from baselines.mpc.limits import TrolleyLimits
-from baselines.mpc.settings import MpcSettings
+from baselines.mpc.settings import MpcSettings, SwayState
 from crane_env.controller import Controller
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
@@ -68,13 +68,24 @@ class PredictiveController(Controller):
     Args:
         crane: nominal parameters; the true crane may differ.
         settings: the optimal control problem.
+        sway_state: where the controller has its sway from; the settings may leave it open.
+
+    Raises:
+        ValueError: the settings want another sway state.
     """
 
     crane: CraneParameters = fixed("crane", BUILD_ANOTHER, "The nominal parameters.")
     settings: MpcSettings = fixed("settings", BUILD_ANOTHER, "The optimal control problem.")
     limits: TrolleyLimits = fixed("limits", BUILD_ANOTHER, "Limits of the moves.")
 
-    def __init__(self, crane: CraneParameters, settings: MpcSettings) -> None:
+    def __init__(
+        self, crane: CraneParameters, settings: MpcSettings, sway_state: SwayState = "measured"
+    ) -> None:
+        if settings.sway_state not in (None, sway_state):
+            raise ValueError(
+                f"The sway_state of this controller is {sway_state!r} and cannot be "
+                f"{settings.sway_state!r}: only linear and linear-cvxpy let it be chosen."
+            )
         self._crane = crane
         self._settings = settings
         self._limits = TrolleyLimits(crane, settings)
@@ -82,7 +93,8 @@ class PredictiveController(Controller):
 
     @final
     def reset(self) -> None:
-        """Forgets the last plan and the statistics."""
+        """Forgets the last plan and action, and the statistics."""
+        self._last_action: float | None = None
         # The last plan, its last move repeated N_c times, and the steps since it was made.
         self._schedule = np.zeros(2 * self.settings.control_horizon)
         self._schedule_age = self.settings.control_horizon
@@ -120,7 +132,8 @@ class PredictiveController(Controller):
         else:
             acceleration = math.nan  # for which `saturate` brakes
             self._braking_steps += 1
-        return np.array([self.limits.saturate(acceleration, measured.trolley_velocity)])
+        self._last_action = self.limits.saturate(acceleration, measured.trolley_velocity)
+        return np.array([self._last_action])
 
     @property
     @final
@@ -153,8 +166,10 @@ class NativeSolverController(PredictiveController):
     the problem to a solver of their own.
     """
 
-    def __init__(self, crane: CraneParameters, settings: MpcSettings) -> None:
-        super().__init__(crane, settings)
+    def __init__(
+        self, crane: CraneParameters, settings: MpcSettings, sway_state: SwayState = "measured"
+    ) -> None:
+        super().__init__(crane, settings, sway_state)
         self._solver = self._pose()
 
     @abstractmethod

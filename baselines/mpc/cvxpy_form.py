@@ -4,17 +4,18 @@ At step k, for the state x = (s', theta, theta') and acceleration u = s'' held o
 
     minimise    sum_{i=1}^{N_p} (y_i - w)^2 + lambda_1 sum_{i=1}^{N_p} d_i^2
                 + lambda_u sum_{i=0}^{N_c-1} u_i^2
-    subject to  x_{i+1} = A(l) x_i + B(l) u_i      x_0 measured
-                y_i = s'_i + l theta'_i            d_i the sway term of `StageCost`
+    subject to  x_{i+1} = A(l) x_i + B(l) u_i      x_0 measured, or its sway the model's
+                y_i = s'_i + l theta'_i + o        d_i the sway term of `StageCost`
                 a_min <= u_i <= a_max              i = 0 ... N_c - 1
                 low_i <= s'_i <= high_i            i = 1 ... N_c, see `TrolleyLimits`
                 u_i = u_{N_c-1} or 0               i = N_c ... N_p - 1, the tail
 
 A(l), B(l) are the matrix exponential of eq. (3) over T; the first state, the position, enters
-neither the cost nor the limits and is left out. The problem is built once, as a disciplined
-parametrised program, and solved by Clarabel: of the solvers that come with CVXPY it alone is
-accurate (1e-7 m/s^2) within a control period (6 ms). DAQP takes 60 ms on this sparse form, OSQP
-33 ms for 6e-7 m/s^2, SCS seconds.
+neither the cost nor the limits and is left out. The offset o is 0, except for a `linear` whose
+output is corrected: there it is by how much the measured y exceeds the model's now. The problem is
+built once, as a disciplined parametrised program, and solved by Clarabel: of the solvers that come
+with CVXPY it alone is accurate (1e-7 m/s^2) within a control period (6 ms). DAQP takes 60 ms on
+this sparse form, OSQP 33 ms for 6e-7 m/s^2, SCS seconds.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from numpy.typing import NDArray
 
 from baselines.mpc.controller import NativeSolverController, Plan
 from baselines.mpc.prediction.cable import assumed_length
-from baselines.mpc.settings import MpcSettings
+from baselines.mpc.settings import MpcSettings, SwayState
+from crane_env.kinematics import payload_velocity
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from crane_env.support.extras import require
@@ -58,16 +60,24 @@ class Equation6Mpc(NativeSolverController):
         crane: nominal parameters.
         settings: the optimal control problem.
         fixed_length: length of the model [m], ref. [18]; None: the measured one, Assumption A.
+        sway_state: where the sway comes from; other than "measured" only with a fixed length.
 
     Raises:
         ImportError: CVXPY is not installed; the message names the extra.
+        ValueError: the settings want another sway state.
     """
 
     def __init__(
-        self, crane: CraneParameters, settings: MpcSettings, fixed_length: float | None
+        self,
+        crane: CraneParameters,
+        settings: MpcSettings,
+        fixed_length: float | None,
+        sway_state: SwayState = "measured",
     ) -> None:
         self._fixed_length = fixed_length
-        super().__init__(crane, settings)
+        self._sway_state = sway_state
+        self._model_sway = np.zeros(2)
+        super().__init__(crane, settings, sway_state)
 
     def _pose(self) -> Any:
         """States the problem; its parameters are set anew at each step."""
@@ -77,14 +87,14 @@ class Equation6Mpc(NativeSolverController):
 
         A, B = cp.Parameter((3, 3), name="A"), cp.Parameter((3, 1), name="B")
         length = cp.Parameter(nonneg=True, name="length")
-        measured = cp.Parameter(3, name="measured")
-        reference = cp.Parameter(name="reference")
+        start = cp.Parameter(3, name="start")
+        reference, offset = cp.Parameter(name="reference"), cp.Parameter(name="offset")
         slowest, fastest = cp.Parameter(moves, name="slowest"), cp.Parameter(moves, name="fastest")
 
         u = cp.Variable((1, moves), name="u")
         x = cp.Variable((3, horizon + 1), name="x")
         velocity, sway, sway_rate = x[0, 1:], x[1, 1:], x[2, 1:]
-        payload_velocity = velocity + length * sway_rate
+        tracked = velocity + length * sway_rate + offset
         sway_term = {
             "displacement": length * sway,
             "angle": sway,
@@ -92,12 +102,12 @@ class Equation6Mpc(NativeSolverController):
         }[cost.sway_term]
 
         objective = (
-            cp.sum_squares(payload_velocity - reference)
+            cp.sum_squares(tracked - reference)
             + cost.sway_weight * cp.sum_squares(sway_term)
             + cost.acceleration_weight * cp.sum_squares(u)
         )
         constraints = [
-            x[:, 0] == measured,
+            x[:, 0] == start,
             x[:, 1:] == A @ x[:, :-1] + B @ (u @ self._held()),
             u >= lowest,
             u <= highest,
@@ -121,12 +131,22 @@ class Equation6Mpc(NativeSolverController):
         velocity, moves = observation.trolley_velocity, self.settings.control_horizon
         lower, upper = self.limits.bounds(velocity)
         A, B = self._discretised(length)
+        sway, offset = np.array([observation.sway_angle, observation.sway_rate]), 0.0
+        if self._sway_state != "measured":
+            if (last := self._last_action) is None:
+                self._model_sway = np.zeros(2)
+            else:
+                self._model_sway = A[1:, 1:] @ self._model_sway + B[1:, 0] * last
+            sway = self._model_sway
+        if self._sway_state == "corrected":
+            offset = payload_velocity(*observation[1:6]) - (velocity + length * sway[1])
         values = {
             "A": A,
             "B": B,
             "length": length,
-            "measured": np.array([velocity, observation.sway_angle, observation.sway_rate]),
+            "start": np.array([velocity, *sway]),
             "reference": observation.travel_reference,
+            "offset": offset,
             "slowest": velocity + lower[moves:],
             "fastest": velocity + upper[moves:],
         }
@@ -160,7 +180,8 @@ class Equation6Mpc(NativeSolverController):
 
 def linear_cvxpy(crane: CraneParameters, settings: MpcSettings) -> Equation6Mpc:
     """`linear` by the readable statement."""
-    return Equation6Mpc(crane, settings, settings.model_cable_length)
+    state = settings.sway_state or "corrected"
+    return Equation6Mpc(crane, settings, settings.model_cable_length, state)
 
 
 def adaptive_cvxpy(crane: CraneParameters, settings: MpcSettings) -> Equation6Mpc:

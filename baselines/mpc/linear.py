@@ -6,10 +6,12 @@ With the prediction linear, eq. (6) is, up to a constant and halved, a quadratic
 
 subject to the limits of `TrolleyLimits`. The variants differ only in where H and f come from:
 
-    `linear`    model (3) at one fixed length, ref. [18]: H is a constant. Its states are the
-                measured v, theta and theta'; their angles act through the *model's* length, so that
-                it takes y = s' + l_model theta' for the payload velocity and l_model theta for the
-                displacement, as a fixed C of eq. (3) does. That is its only error, and all of it.
+    `linear`    model (3) at one fixed length, ref. [18]: H is a constant. Its angles act through
+                the *model's* length: it takes y = s' + l_model theta' for the payload velocity and
+                l_model theta for the displacement, as a fixed C of eq. (3) does. Where it has its
+                sway from, the paper does not say: from the model itself, with an output correction
+                ("corrected", the reading that reproduces most of the paper's claims) or without
+                (`linear-open-loop`), or from a sensor (`linear-measured`); see `SwayModel`.
     `adaptive`  model (3) at the measured length, constant over the horizon (Assumption A).
     `ltv`       model (1) linearised at theta = 0 along a cable that keeps its measured rate
                 (Assumption B), which the paper gives to the nonlinear MPC alone. But what is
@@ -28,9 +30,10 @@ from numpy.typing import NDArray
 from baselines.mpc.controller import Plan, PredictiveController
 from baselines.mpc.prediction.cable import assumed_length
 from baselines.mpc.prediction.constant_length import PendulumPrediction
+from baselines.mpc.prediction.sway_model import Sway, SwayModel
 from baselines.mpc.prediction.varying_length import TimeVaryingPrediction
 from baselines.mpc.quadratic_program import QuadraticProgram
-from baselines.mpc.settings import MpcSettings
+from baselines.mpc.settings import MpcSettings, SwayState
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 
@@ -141,26 +144,38 @@ class LinearMpc(PredictiveController):
         crane: nominal parameters.
         settings: the optimal control problem.
         model: where the cost comes from.
+        sway_state: where the sway comes from.
 
     Raises:
         ImportError: DAQP is not installed; the message names the extra.
+        ValueError: the settings want another sway state.
     """
 
-    def __init__(self, crane: CraneParameters, settings: MpcSettings, model: CostModel) -> None:
-        super().__init__(crane, settings)
+    def __init__(
+        self,
+        crane: CraneParameters,
+        settings: MpcSettings,
+        model: CostModel,
+        sway_state: SwayState = "measured",
+    ) -> None:
+        super().__init__(crane, settings, sway_state)
         self._model = model
+        self._sway_model = SwayModel(crane, settings, sway_state)
+        self._sway = Sway()
         self._program = QuadraticProgram(self.limits.velocity_gain)
 
     def quadratic_program(self, observation: Observation) -> tuple[NDArray[np.float64], ...]:
         """H, f and the bounds, lower and upper, of (u, `limits.velocity_gain` u) from here.
 
         Args:
-            observation: finite; what is measured.
+            observation: finite; what is measured. Where the sway is not, the model's is taken.
         """
-        cost = self._model.cost(observation)
+        cost = self._model.cost(self._sway_model.believed(observation, self._sway))
         return *cost, *self.limits.bounds(observation.trolley_velocity)
 
     def _plan(self, observation: Observation, shifted_moves: NDArray[np.float64]) -> Plan:
+        last = self._last_action
+        self._sway = Sway() if last is None else self._sway_model.after(self._sway, last)
         solution = self._program.solve(*self.quadratic_program(observation))
         return Plan(solution.minimiser, solution.iterations)
 
@@ -192,10 +207,24 @@ def time_varying_cost(crane: CraneParameters, settings: MpcSettings) -> TimeVary
 
 
 def linear(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:
-    """MPC of ref. [18]: model (3) at `settings.model_cable_length`."""
+    """MPC of ref. [18]: model (3) at `settings.model_cable_length`, its output corrected."""
+    return _fixed_length(crane, settings, settings.sway_state or "corrected")
+
+
+def linear_open_loop(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:
+    """`linear` with the sway of its model, never corrected."""
+    return _fixed_length(crane, settings, "open-loop")
+
+
+def linear_measured(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:
+    """`linear` with measured sway."""
+    return _fixed_length(crane, settings, "measured")
+
+
+def _fixed_length(crane: CraneParameters, settings: MpcSettings, state: SwayState) -> LinearMpc:
     prediction = PendulumPrediction(crane, settings)
     model = FixedCost(prediction, move_cost(settings), settings.model_cable_length)
-    return LinearMpc(crane, settings, model)
+    return LinearMpc(crane, settings, model, state)
 
 
 def adaptive(crane: CraneParameters, settings: MpcSettings) -> LinearMpc:

@@ -15,6 +15,8 @@ from crane_env.support.fields import from_fields
 
 Tail = Literal["hold", "zero"]
 
+SwayState = Literal["measured", "open-loop", "corrected"]
+
 LONGEST = {"prediction_horizon": 2000, "control_horizon": 200}
 """Longest horizons [control periods]: beyond them a plan takes longer than anyone waits."""
 
@@ -35,6 +37,8 @@ class MpcSettings:
         cost: weights and sway term of eq. (6).
         tail: the input after N_c moves: "hold" the last move (the MPC convention) or "zero".
         model_cable_length: constant length of the linear MPC's model, ref. [18], 0.1 to 1000 [m].
+        sway_state: where the linear MPC has its sway from, see `SwayModel`: "measured", "open-loop"
+            or "corrected"; None: the controller's own, which for all but "linear" is fixed.
         acceleration_limits: lowest and highest trolley acceleration [m/s^2]; None: the crane's.
         velocity_limits: lowest and highest trolley velocity [m/s]; None: the crane's.
 
@@ -47,6 +51,7 @@ class MpcSettings:
     cost: StageCost = field(default_factory=StageCost)
     tail: Tail = "hold"
     model_cable_length: float = 8.0
+    sway_state: SwayState | None = None
     acceleration_limits: tuple[float, float] | None = None
     velocity_limits: tuple[float, float] | None = None
 
@@ -62,6 +67,8 @@ class MpcSettings:
             )
         object.__setattr__(self, "cost", StageCost.of(self.cost))
         choice("tail", self.tail, get_args(Tail))
+        if self.sway_state is not None:
+            choice("sway_state", self.sway_state, get_args(SwayState))
         length = within("model_cable_length", self.model_cable_length, *MODEL_LENGTHS, "m")
         object.__setattr__(self, "model_cable_length", length)
         for name in ("acceleration_limits", "velocity_limits"):

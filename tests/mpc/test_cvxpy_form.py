@@ -77,6 +77,22 @@ def test_the_two_forms_agree_for_every_reading_of_eq_6(name: str, term: Any, tai
     assert readable.statistics.failures == 0
 
 
+@pytest.mark.parametrize("sway_state", ["measured", "open-loop", "corrected"])
+def test_the_two_forms_agree_on_the_way_wherever_the_sway_comes_from(sway_state: Any) -> None:
+    problem = MpcSettings(
+        cost=StageCost(sway_term="printed"), sway_state=sway_state, velocity_limits=(-0.7, 1.1)
+    )
+    fast, readable = build("linear", problem), build("linear-cvxpy", problem)
+    rng = np.random.default_rng(4)
+    for _ in range(2):
+        fast.reset()
+        readable.reset()
+        for _ in range(15):
+            seen = random_observation(rng)
+            assert act(fast, seen) == pytest.approx(act(readable, seen), abs=TOLERANCE)
+    assert readable.statistics.failures == 0
+
+
 def test_the_statement_is_a_disciplined_parametrised_program() -> None:
     assert adaptive_cvxpy(CRANE, MpcSettings())._solver.is_dcp(dpp=True)
 

@@ -13,7 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import crane_env
-from baselines.mpc.linear import adaptive, adaptive_cost, linear, ltv, time_varying_cost
+from baselines import make_controller
+from baselines.mpc.linear import (
+    adaptive,
+    adaptive_cost,
+    linear,
+    linear_measured,
+    linear_open_loop,
+    ltv,
+    time_varying_cost,
+)
 from baselines.mpc.nonlinear import nmpc_b
 from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller
@@ -24,6 +33,7 @@ from tests.mpc.prediction.linear_crane import (
     act,
     observe,
     random_observation,
+    simulate,
     simulated_cost,
     simulated_residuals,
 )
@@ -62,7 +72,7 @@ def test_hessian_and_gradient_are_the_differences_of_simulated_costs(term: Any, 
 
 @pytest.mark.parametrize("term", TERMS)
 @pytest.mark.parametrize("tail", TAILS)
-@pytest.mark.parametrize("build", [adaptive, linear])
+@pytest.mark.parametrize("build", [adaptive, linear_measured])
 def test_unconstrained_the_action_is_the_batch_least_squares_solution(
     build: Any, term: Any, tail: Any
 ) -> None:
@@ -87,14 +97,14 @@ def test_unconstrained_the_action_is_the_batch_least_squares_solution(
 
 
 def test_at_the_reference_and_at_rest_there_is_nothing_to_do() -> None:
-    for build in (linear, adaptive):
+    for build in (linear_measured, linear_open_loop, linear, adaptive):
         controller = build(CRANE, MpcSettings())
         assert act(controller, observe(1.0, reference=1.0)) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_fixed_length_model_is_the_adaptive_one_at_that_length_and_deaf_to_others() -> None:
     problem = MpcSettings(model_cable_length=6.0)
-    fixed, measured = linear(CRANE, problem), adaptive(CRANE, problem)
+    fixed, measured = linear_measured(CRANE, problem), adaptive(CRANE, problem)
     rng = np.random.default_rng(2)
     differences = []
     for _ in range(50):
@@ -105,6 +115,56 @@ def test_the_fixed_length_model_is_the_adaptive_one_at_that_length_and_deaf_to_o
         assert action == pytest.approx(act(measured, at_model), abs=1e-10)
         differences.append(abs(action - act(measured, start)))
     assert max(differences) > 0.1
+
+
+def crane_of_the_model(steps: int, problem: MpcSettings, build: Any) -> list[float]:
+    """Actions on a crane that is model (3) at the model's length, with reference 1 m/s."""
+    controller, length = build(CRANE, problem), problem.model_cable_length
+    seen, actions = observe(reference=1.0, length=length), []
+    for _ in range(steps):
+        action = act(controller, seen)
+        (velocity, sway, rate), *_ = simulate(seen, length, np.array([action]), CRANE)
+        seen = seen._replace(trolley_velocity=velocity, sway_angle=sway, sway_rate=rate)
+        actions.append(action)
+    return actions
+
+
+def test_on_the_crane_of_its_model_a_sway_sensor_tells_nothing_new() -> None:
+    # To the cosine of the sway, which the measured payload velocity has and the model has not.
+    problem = MpcSettings(model_cable_length=6.0)
+    measured = crane_of_the_model(200, problem, linear_measured)
+    assert max(map(abs, measured)) > 1.0
+    assert crane_of_the_model(200, problem, linear_open_loop) == pytest.approx(measured, abs=1e-12)
+    assert crane_of_the_model(200, problem, linear) == pytest.approx(measured, abs=0.02)
+
+
+def test_without_a_sensor_the_sway_is_what_the_actions_since_the_reset_make_of_the_model() -> None:
+    # A crane that does not swing at all, which the open loop cannot know and the correction does.
+    problem = MpcSettings(**UNLIMITED)
+    length = problem.model_cable_length
+    for build in (linear_open_loop, linear):
+        controller, at_model = build(CRANE, problem), linear_measured(CRANE, problem)
+        for reference in (1.0, -0.5):
+            controller.reset()
+            model, last = (0.0, 0.0), 0.0
+            for _ in range(40):
+                seen = observe(0.3, 0.0, 0.0, reference, length=4.0)
+                past = observe(0.0, *model, length=length)
+                _, *model = simulate(past, length, np.array([last]), CRANE)[0]
+                if build is linear:
+                    # The payload moves as the trolley does; the model's swings beside it.
+                    believed = observe(0.3 - length * model[1], *model, reference)
+                else:
+                    believed = observe(0.3, *model, reference)
+                last = act(controller, seen)
+                assert last == pytest.approx(act(at_model, believed), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["adaptive", "ltv", "nmpc-b", "tabulated", "linear-measured"])
+def test_a_sway_state_that_a_controller_cannot_have_is_refused_in_one_sentence(name: str) -> None:
+    make_controller(name, settings={"sway_state": "measured"})
+    with pytest.raises(ValueError, match="is 'measured' and cannot be 'corrected': only linear"):
+        make_controller(name, settings={"sway_state": "corrected"})
 
 
 def test_readings_shorter_than_the_hoist_allows_are_taken_as_its_limit() -> None:
@@ -157,7 +217,7 @@ def test_limits_are_never_exceeded_over_2e4_disturbed_steps(build: Any) -> None:
     assert controller.statistics.failures == 0
 
 
-@pytest.mark.parametrize("build", [adaptive, linear])
+@pytest.mark.parametrize("build", [adaptive, linear_measured])
 def test_a_trolley_beyond_its_speed_limit_is_braked_as_hard_as_it_can(build: Any) -> None:
     problem = MpcSettings(acceleration_limits=(-1.5, 3.0), velocity_limits=(-0.9, 1.1))
     controller = build(CRANE, problem)

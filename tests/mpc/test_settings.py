@@ -27,6 +27,8 @@ from crane_env.stage_cost import StageCost
         ({"cost": {"sway_term": "angles"}}, "valid: displacement, angle, printed"),
         ({"cost": 3.0}, "StageCost or a mapping, not float"),
         ({"tail": "ramp"}, "Unknown tail 'ramp'; valid: hold, zero"),
+        ({"sway_state": "guessed"}, "Unknown sway_state 'guessed'; valid: measured, open-loop, "),
+        ({"sway_state": True}, "Unknown sway_state True; valid"),
         ({"prediction_horizon": 10**9}, "prediction_horizon must be .* at least 1 and below 2001"),
         ({"control_horizon": 10**400}, "control_horizon must be .* at least 1 and below 201"),
         ({"model_cable_length": 0.0}, "model_cable_length must be from 0.1 to 1000 m, not 0.0"),

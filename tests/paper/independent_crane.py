@@ -127,7 +127,12 @@ def first_moves(
 
 
 def table_means(controller: str) -> Means:
-    """Means of "linear", "adaptive" or "ltv" over Table I."""
+    """Means over Table I.
+
+    Args:
+        controller: "adaptive", "ltv", or a fixed length with its sway measured ("linear-measured"),
+            from the model ("linear-open-loop"), or that with its output corrected ("linear").
+    """
     travel, hoist = references()
     rates = hoist_rates(hoist)
     count = len(travel)
@@ -136,17 +141,24 @@ def table_means(controller: str) -> Means:
     velocities, positions = np.empty((count, STEPS)), np.empty((count, STEPS))
     fixed, at_rest = np.full(count, MODEL_LENGTH), np.zeros(count)
     largest = fastest = 0.0
+    one_a, one_b = model(fixed, at_rest)
+    own_sway = np.zeros((count, 2))  # theta, theta' of the fixed model
     for k in range(STEPS):
         _, v, length, angle, angle_rate = x.T
         velocities[:, k] = v + length * angle_rate * np.cos(angle) + rates[:, k] * np.sin(angle)
         positions[:, k] = x[:, 0] + length * np.sin(angle)
         state, w = x[:, [1, 3, 4]], travel[:, k]
-        if controller == "linear":
+        if controller in ("linear", "linear-open-loop"):
+            state = np.column_stack([v, own_sway])
+        if controller == "linear":  # the offset of y, for which alone v counts
+            state[:, 0] = velocities[:, k] - MODEL_LENGTH * own_sway[:, 1]
+        if controller.startswith("linear"):
             u = first_moves(fixed, at_rest, state, w, fixed=True)
         elif controller == "adaptive":
             u = first_moves(length, at_rest, state, w, fixed=True)
         else:
             u = first_moves(length, rates[:, k], state, w, fixed=False)
+        own_sway = np.einsum("cij,cj->ci", one_a[:, 1:, 1:], own_sway) + one_b[:, 1:] * u[:, None]
         winding = (rates[:, k + 1] - rates[:, k]) / PERIOD
 
         def motion(

@@ -12,7 +12,9 @@ from tests.paper.independent_crane import table_means
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("controller", ["linear", "adaptive", "ltv"])
+@pytest.mark.parametrize(
+    "controller", ["linear", "linear-open-loop", "linear-measured", "adaptive", "ltv"]
+)
 def test_another_crane_and_another_mpc_give_the_means_of_table_1(controller: str) -> None:
     other = table_means(controller)
     crane = CraneParameters()
