@@ -40,6 +40,7 @@ CONTROLLERS: dict[str, str] = {
     "adaptive-cvxpy": "baselines.mpc.cvxpy_form:adaptive_cvxpy",
     "ppo": "baselines.rl.onnx_policy:ppo",
     "sac": "baselines.rl.onnx_policy:sac",
+    "lqr": "baselines.classical.lqr:lqr",
 }
 """Name of each controller and where its factory is."""
 

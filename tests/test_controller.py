@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from baselines import CONTROLLERS, make_controller
+from baselines import CONTROLLERS, make_controller, settings_type
 from baselines.mpc.controller import PredictiveController
+from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller
 from crane_env.observation import Observation
 from tests.mpc.prediction.linear_crane import act, mirrored, observations, random_observation
@@ -23,7 +24,7 @@ from tests.mpc.prediction.linear_crane import act, mirrored, observations, rando
 LIMIT = 5.0
 SLOW = {"nmpc-a-ipopt", "nmpc-b-ipopt", "nmpc-a-do-mpc", "linear-cvxpy", "adaptive-cvxpy"}
 LEARNED = {"ppo", "sac"}
-PREDICTIVE = [name for name in CONTROLLERS if name not in {"manual", *LEARNED}]
+PREDICTIVE = [name for name in CONTROLLERS if settings_type(name) is MpcSettings]
 QUICK = [name for name in CONTROLLERS if name not in SLOW]
 
 every_controller = pytest.mark.parametrize("name", CONTROLLERS)

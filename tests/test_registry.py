@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from baselines import CONTROLLERS, make_controller, settings_type
+from baselines.classical.lqr import LqrSettings
 from baselines.manual import Manual
 from baselines.mpc.settings import MpcSettings
 from crane_env.parameters import CraneParameters
@@ -207,5 +208,5 @@ def test_any_json_value_gives_a_controller_or_a_value_error(
 def test_every_controller_of_the_registry_is_named_once_and_found() -> None:
     assert len(set(CONTROLLERS.values())) == len(CONTROLLERS)
     for name in CONTROLLERS:
-        assert settings_type(name) in (None, MpcSettings)
+        assert settings_type(name) in (None, MpcSettings, LqrSettings)
     assert isinstance(make_controller("manual"), Manual)

@@ -203,6 +203,8 @@ def play(spec: EpisodeSpec) -> Trajectory:
 def build_controller(spec: EpisodeSpec) -> Controller:
     """A new controller of an episode; the setup's settings are for those that take `MpcSettings`.
 
+    Of others that minimise a `StageCost`, the setup's is the `cost` among their settings.
+
     Raises:
         ValueError, ImportError: as `make_controller`.
     """
@@ -231,7 +233,12 @@ def check_settings(specs: Iterable[EpisodeSpec]) -> None:
 
 @functools.lru_cache(maxsize=8)
 def _controller(name: str, setup: Setup) -> Controller:
-    settings = setup.settings if settings_type(name) is MpcSettings else None
+    takes: Any = settings_type(name)
+    settings: object = None
+    if takes is MpcSettings:
+        settings = setup.settings
+    elif takes is not None and isinstance(getattr(takes.of(None), "cost", None), StageCost):
+        settings = {"cost": setup.settings.cost}
     return make_controller(name, parameters=setup.believed, settings=settings)
 
 

@@ -18,13 +18,21 @@ import baselines.evaluation.workers
 import crane_env
 from baselines.evaluation import provenance
 from baselines.evaluation.comparison import check_controllers, compare, index_values
-from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs, play
+from baselines.evaluation.episode_spec import (
+    EpisodeSpec,
+    Setup,
+    build_controller,
+    episode_specs,
+    play,
+)
 from baselines.evaluation.results import PARTIAL_AGE, EpisodeResult, ResultsFolder
 from baselines.evaluation.tables import lowest, mean_and_deviation
 from baselines.evaluation.workers import Task, perform, play_all
 from baselines.mpc.settings import MpcSettings
+from baselines.registry import make_controller
 from crane_env import CraneParameters, Trajectory
 from crane_env.operators.registry import operator_program
+from crane_env.stage_cost import StageCost
 
 SHORT = Setup(max_steps=120)
 """Manoeuvre 1 presses its travel button at step 92."""
@@ -437,6 +445,16 @@ def test_a_controller_may_believe_in_another_crane_than_it_drives() -> None:
     assert right.parameters == wrong.parameters == crane
     assert right.metrics().IAE < wrong.metrics().IAE
     assert (right.action != wrong.action).any()
+
+
+def test_the_cost_of_a_setup_is_that_of_every_controller_which_minimises_one() -> None:
+    weights = StageCost(sway_weight=0.3, acceleration_weight=0.01)
+    setup = dataclasses.replace(SHORT, settings=MpcSettings(cost=weights))
+    seen = np.array([0.0, 0.5, 5.0, 0.0, 0.02, 0.0, 1.0, 0.0])
+    for name in ("lqr", "adaptive"):
+        (spec,) = episode_specs([name], ["table1:1"], [0], setup)
+        expected = make_controller(name, settings={"cost": weights}).act(seen)
+        assert build_controller(spec).act(seen) == expected != make_controller(name).act(seen)
 
 
 def test_nonsense_is_refused_with_what_is_allowed() -> None:

@@ -1,0 +1,1 @@
+"""Classical anti-sway control: laws in closed form."""
