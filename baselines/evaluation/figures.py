@@ -206,7 +206,7 @@ def index_figure(
     numbers = [operator.removeprefix("table1:") for operator in operators]
     table = all(number.isdecimal() for number in numbers)
     ticks, what = (numbers, "manoeuvre of Table I") if table else (operators, "operator")
-    aslant = {"rotation": 30.0, "ha": "right", "rotation_mode": "anchor"}
+    aslant: dict[str, Any] = {"rotation": 30.0, "ha": "right", "rotation_mode": "anchor"}
     long = len(ticks) * max(map(len, ticks)) > MOST_LETTERS
     panels[-1].set_xticks(range(len(operators)), ticks, **(aslant if long else {}))
     panels[-1].set_xlabel(what)

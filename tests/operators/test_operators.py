@@ -29,7 +29,10 @@ from tests.operators.nominal_crane import at_rest
 
 PAPER = CraneParameters.paper()
 PRESSED = Buttons(forward=True)
-VALID = "random, manoeuvre, table1:1 … table1:10, script:FILE, package.module:factory"
+VALID = (
+    "random, manoeuvre, table1:1 … table1:10, person:novice|trained|expert, script:FILE, "
+    "package.module:factory"
+)
 
 PROGRAMS = [
     RandomButtons(),
