@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from baselines import make_controller
+from baselines.study.lagging_crane import PAPER, PERIOD, operate
+from baselines.study.oscillation import oscillating_share
 from crane_env.environment.single import OILCraneEnv
 from crane_env.observation import CraneState
 from crane_env.operators.base import Buttons
@@ -24,7 +26,6 @@ from crane_env.operators.person.practice import Practice
 from crane_env.operators.person.sight import Sight
 from crane_env.parameters import CraneParameters
 from crane_env.tasks.task import Goal, Obstacle, Task
-from tests.operators.person.lagging_crane import PAPER, PERIOD, operate
 
 EXACT = {"position_noise": 0.0, "speed_noise": 0.0, "lean_noise": 0.0}
 FAR = Task(goals=(Goal(position=9.0),))
@@ -164,27 +165,10 @@ def test_a_run_out_is_learned_from_ten_holds() -> None:
 
 def test_who_presses_again_too_soon_oscillates_with_the_crane() -> None:
     """Three reversals or more: nearly always at half a run-out, seldom at 1.2."""
-    shares = []
-    for wait in (0.5, 1.2):
-        oscillating = []
-        for run_out in (1.2, 1.8, 2.4):
-            pause = wait * run_out
-            person = dataclasses.replace(
-                TRAINED,
-                awareness=0.0,
-                awareness_gain=0.0,
-                patience_gain=1.0,
-                learning_rate=0.0,
-                pause=pause,
-                patience=pause,
-                believed_run_out=run_out,
-            )
-            for seed in range(15):
-                operator = PersonOperator(person)
-                goal = float(np.random.default_rng(seed).uniform(1.0, 10.0))
-                operate(operator, run_out, lags=2, seed=seed, duration=60.0, goal=goal)
-                oscillating.append(operator.reversals >= 3)
-        shares.append(np.mean(oscillating))
+    shares = [
+        np.mean([oscillating_share(TRAINED, wait, run_out, 15) for run_out in (1.2, 1.8, 2.4)])
+        for wait in (0.5, 1.2)
+    ]
     assert shares[0] >= 0.9
     assert shares[1] <= 0.3
 

@@ -1,4 +1,4 @@
-"""Lagging crane: a linear plant whose payload follows the travel buttons late, for a known person.
+"""Lagging crane: a linear plant whose payload follows the travel buttons late, to know persons by.
 
 The payload's speed follows the reference through one or two equal first-order lags in a row, of
 times that add up to tau: after a release at a steady speed y it runs on by tau y, and after any
@@ -31,6 +31,14 @@ def operate(
     goal: float | None = None,
 ) -> float:
     """Plays until a practice is done, a goal is reached or the time is over.
+
+    Args:
+        operator: who presses.
+        run_out: tau [s].
+        lags: how many lags add up to it.
+        seed: of what the operator draws.
+        duration: longest time played [s].
+        goal: where the payload is to stand [m], from 0; None: nowhere.
 
     Returns:
         The time at which the goal was reached [s], else nan.
