@@ -26,10 +26,10 @@ TABLE_1_NUMBERS = [str(number) for number in range(1, len(TABLE_1) + 1)]
 """What may follow "table1:"."""
 
 VALID_NAMES = (
-    f"random, manoeuvre, table1:1 … table1:{len(TABLE_1)}, person:{'|'.join(PERSONS)}, "
+    f"random, stress, manoeuvre, table1:1 … table1:{len(TABLE_1)}, person:{'|'.join(PERSONS)}, "
     "script:FILE, package.module:factory"
 )
-FAMILIES = ("random", "manoeuvre", "table1", "person", "script")
+FAMILIES = ("random", "stress", "manoeuvre", "table1", "person", "script")
 """What the names of operators begin with; no module of a factory is looked for under these."""
 
 
@@ -37,8 +37,8 @@ def make_operator(spec: OperatorSpec) -> Operator:
     """Makes an operator.
 
     Args:
-        spec: a name: "random" (see `RandomButtons`), "manoeuvre" (`RandomManoeuvre`), "table1:1" to
-            "table1:10" (`Table1Manoeuvre`), "script:FILE" (`ButtonScript`), or
+        spec: a name: "random" or "stress" (see `RandomButtons`), "manoeuvre" (`RandomManoeuvre`),
+            "table1:1" to "table1:10" (`Table1Manoeuvre`), "script:FILE" (`ButtonScript`), or
             "package.module:factory", a function of your own that takes nothing and returns a
             program or an operator; a mapping of a name and fields of that program, as
             `dataclasses.asdict` makes it; a program; an operator, which is returned as it is; or a
@@ -132,6 +132,8 @@ def _program(name: object, fields: Mapping[str, Any]) -> Any:
     match str(name).partition(":"):
         case "random", "", "":
             program = RandomButtons()
+        case "stress", "", "":
+            program = RandomButtons.stress()
         case "manoeuvre", "", "":
             program = RandomManoeuvre()
         case "table1", ":", number if number in TABLE_1_NUMBERS:
