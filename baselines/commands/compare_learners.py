@@ -65,6 +65,7 @@ DISTRIBUTION_SHIFTS: dict[str, tuple[str, CraneParameters]] = {
     "payload 500 kg": ("manoeuvre", CraneParameters(payload_mass=500.0)),
     "soft drive, 20 rad/s": ("manoeuvre", CraneParameters(drive_bandwidth=20.0)),
     "random buttons": ("random", CraneParameters()),
+    "stress": ("stress", CraneParameters()),
 }
 """Operator and crane of each departure from what was trained."""
 

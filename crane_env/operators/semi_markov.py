@@ -39,8 +39,8 @@ No logs of crane operators are public, so the numbers are assumed, but within bo
 
 - Starts and duty. A hoist or travel motor of group M6 (ISO 4301-1; 3m of FEM 9.511) is chosen for
   at most 300 starts an hour and 50 % of the time (FEM 9.683; 240 and 40 % in M5, 360 and 60 % in
-  M7). In episodes of 25 s the defaults come to 290 starts an hour on either axis, 40 % (travel) and
-  27 % (hoist) of the time. Table I's own hoist has 288 and 32 %.
+  M7). In episodes of 25 s the defaults come to 289 starts an hour and 41 % of the time (travel),
+  276 and 26 % (hoist). Table I's own hoist has 288 and 32 %.
 - The cable. A ramp of the hoist to its speed V in the time t_r leaves the payload bouncing with up
   to 2 V / t_r, 6.7 m/s^2 on the paper's crane; a start soon after a stop can add up to more than g,
   and the cable goes slack. The bouncing halves in 1.7 s at the longest cable, so that the
