@@ -94,10 +94,9 @@ class ResultsFolder:
         """The table of metrics."""
         return self.path / "metrics.parquet"
 
-    @property
-    def figures(self) -> Path:
-        """Folder of the drawings."""
-        return self.path / "figures"
+    def figure_file(self, number: int) -> Path:
+        """Figure by its number in the paper."""
+        return self.path / "figures" / f"fig{number}.png"
 
     def trajectory_file(self, spec: EpisodeSpec) -> Path:
         """Where the trajectory of an episode is."""
@@ -272,7 +271,7 @@ class ResultsFolder:
     def remove_summary(self) -> None:
         """Removes table and figures; the episodes stay."""
         self.metrics_file.unlink(missing_ok=True)
-        for figure in self.figures.glob("fig*.*"):
+        for figure in (self.path / "figures").glob("fig*.png"):
             figure.unlink()
 
     def write_manifest(self, manifest: dict[str, Any]) -> None:

@@ -4,15 +4,16 @@ Every controller meets the same manoeuvres, and every index of every controller 
 them. Beside the manoeuvres as they are there may be the same ones without hoisting, and episodes
 that were played one at a time, whose act times no other episode disturbed.
 
-One index is the oscillation of the payload about its reference while it travels on a short cable.
-Section V of the paper reads it off Fig. 4: with the travel button held and the cable lifted, does
-the payload velocity y settle at the reference w, or does it swing about it? Measured on e = y - w
-over the steps at which a travel button is held and the cable is within `SHORT_BAND` of the shortest
-length of its episode:
+Beside the `Metrics` there are indices of how the payload follows its reference while it travels on
+a hoisted cable. Section V of the paper reads it off Fig. 4: with the travel button held and the
+cable lifted, does the payload velocity y settle at the reference w, or does it swing about it?
+Measured on e = y - w over the steps at which a travel button is held,
 
-    error    sqrt(mean e^2)
-    swing    largest distance of two successive turning points of e on opposite sides of zero; 0 if
-             there are none. A lag that dies away, or a ripple on one side, is no swing.
+    short_cable_error   sqrt(mean e^2) while the cable is within `SHORT_BAND` of its shortest
+    hoisted_swing       largest distance of two successive turning points of e on opposite sides of
+                        zero, 0 if there are none, while the cable is by `SHORT_BAND` shorter than
+                        at the start. A lag that dies away, or a ripple on one side, is no swing.
+    error_after_release integral of |y| from the release on: the part of the IAE in which w is 0
 """
 
 from __future__ import annotations
@@ -30,13 +31,13 @@ from numpy.typing import NDArray
 
 from baselines.evaluation.episode_spec import Setup
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
-from crane_env.episode.trajectory import Trajectory
+from crane_env.episode.metrics import release_step
 from crane_env.operators.base import Press, press_events
 from crane_env.operators.script import ButtonScript
 from crane_env.operators.table1 import TABLE_1
 
 SHORT_BAND = 0.05
-"""The cable counts as short within this distance of the shortest length of the episode [m]."""
+"""Cables this much apart count as of different length [m]."""
 
 RIPPLE = 0.01
 """Turning points closer than this to the one before do not count; 1 % of alpha [m/s]."""
@@ -52,7 +53,7 @@ class Evidence:
     Attributes:
         setup: the crane and the controllers' optimal control problem.
         indices: of the manoeuvres as they are: fields of `Metrics`, and where trajectories were
-            kept those of `Oscillation` as "short_cable_error" and "short_cable_swing".
+            kept those of `Tracking`.
         steady: of the same manoeuvres without hoisting.
         timed: of episodes that were played one at a time.
     """
@@ -79,7 +80,7 @@ def measured_indices(
     Args:
         results: of a comparison.
         folder: where it was kept.
-        traced: controllers whose trajectories were kept, for their `Oscillation`.
+        traced: controllers whose trajectories were kept, for their `Tracking`.
 
     Raises:
         ValueError: an episode failed.
@@ -91,11 +92,9 @@ def measured_indices(
             raise ValueError(f"{result.spec.controller} failed: {result.failure}")
         row = result.metrics.as_dict()
         if result.spec.controller in traced:
-            oscillation = short_cable_oscillation(folder.trajectory(result.spec))
-            row |= {
-                f"short_cable_{name}": value
-                for name, value in zip(Oscillation._fields, oscillation, strict=True)
-            }
+            seen = folder.trajectory(result.spec)
+            signals = (seen.cable_length, seen.travel_reference, seen.payload_velocity)
+            row |= tracking(*signals, seen.parameters.control_period)._asdict()
         rows.setdefault(result.spec.controller, []).append(row)
     return {
         controller: {name: np.array([row[name] for row in own], dtype=float) for name in own[0]}
@@ -127,27 +126,37 @@ def plain(indices: Indices) -> dict[str, dict[str, list[float | None]]]:
     }
 
 
-class Oscillation(NamedTuple):
-    """How the payload velocity keeps to its reference on the short cable.
+class Tracking(NamedTuple):
+    """How the payload velocity keeps to its reference.
 
     Attributes:
-        error: root mean square of y - w [m/s]; NaN if the payload never travels on a short cable.
-        swing: about the reference, from one side to the other [m/s]; NaN likewise.
+        short_cable_error: [m/s]; NaN if the payload never travels on a hoisted cable.
+        hoisted_swing: from one side of the reference to the other [m/s]; NaN likewise.
+        error_after_release: [m]; NaN without a release.
     """
 
-    error: float
-    swing: float
+    short_cable_error: float
+    hoisted_swing: float
+    error_after_release: float
 
 
-def short_cable_oscillation(trajectory: Trajectory) -> Oscillation:
-    """Measures an episode."""
-    short = trajectory.cable_length <= trajectory.cable_length.min() + SHORT_BAND
-    error = trajectory.payload_velocity - trajectory.travel_reference
-    seen = error[short & (trajectory.travel_reference != 0.0)]
-    if seen.size == 0:
-        return Oscillation(math.nan, math.nan)
-    swings = (abs(b - a) for a, b in pairwise(turning_points(seen, RIPPLE)) if a * b < 0.0)
-    return Oscillation(float(np.sqrt(np.mean(seen**2))), max(swings, default=0.0))
+def tracking(
+    cable_length: NDArray[np.float64],
+    travel_reference: NDArray[np.float64],
+    payload_velocity: NDArray[np.float64],
+    control_period: float,
+) -> Tracking:
+    """Measures an episode; arrays of shape (N,)."""
+    error = payload_velocity - travel_reference
+    travelling = travel_reference != 0.0
+    short = error[travelling & (cable_length <= cable_length.min() + SHORT_BAND)]
+    hoisted = error[travelling & (cable_length < cable_length[0] - SHORT_BAND)]
+    release = release_step(travel_reference)
+    after = math.nan if release is None else float(np.abs(error[release:]).sum() * control_period)
+    if short.size == 0 or hoisted.size == 0:
+        return Tracking(math.nan, math.nan, after)
+    swings = (abs(b - a) for a, b in pairwise(turning_points(hoisted, RIPPLE)) if a * b < 0.0)
+    return Tracking(float(np.sqrt(np.mean(short**2))), max(swings, default=0.0), after)
 
 
 def turning_points(signal: NDArray[np.float64], height: float) -> list[float]:

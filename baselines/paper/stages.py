@@ -4,7 +4,7 @@ Four stages, each a comparison in a results folder of its own:
 
     defaults       the ten manoeuvres of Table I on the default setup; also without hoisting
     timing         manoeuvre 1, one episode at a time, IPOPT beside the fast solver
-    sensitivity    the defaults stage again for each variation of the setup
+    again          Table I under some of the readings that were screened, see `design`
     repeat         random manoeuvres of the paper's family, seed by seed, metrics only
 """
 
@@ -19,8 +19,9 @@ from baselines.evaluation.comparison import compare
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.mpc.settings import MpcSettings
+from baselines.paper.design import Screening
 from baselines.paper.evidence import Evidence, Indices, measured_indices, steady_manoeuvre
-from baselines.paper.sensitivity import Variation
+from baselines.paper.readings import Reading
 from baselines.paper.verdicts import Judgement, Pair, Share, claim_shares, judge, paired_comparisons
 from crane_env.operators.registry import operator_program
 from crane_env.operators.table1 import TABLE_1
@@ -70,18 +71,20 @@ class Reproduction:
 
     Attributes:
         default: evidence on the default setup, with act times.
-        varied: variations with their evidence.
+        screening: what was screened; None if nothing.
+        again: readings that were played again, with their evidence.
         repeat: evidence of the random manoeuvres; None if there were none.
     """
 
     default: Evidence
-    varied: tuple[tuple[Variation, Evidence], ...] = ()
+    screening: Screening | None = None
+    again: tuple[tuple[Reading, Evidence], ...] = ()
     repeat: Evidence | None = None
 
     @functools.cached_property
     def judgements(self) -> tuple[Judgement, ...]:
         """Verdict on every claim."""
-        return judge(self.default, self.varied)
+        return judge(self.default, self.screening, self.again)
 
     @functools.cached_property
     def pairs(self) -> tuple[Pair, ...]:
@@ -108,14 +111,14 @@ def timing_stage() -> Stage:
     return Stage("timing", tuple(specs), jobs=1)
 
 
-def sensitivity_stage(variations: Iterable[Variation]) -> Stage:
-    """Table I on other setups."""
-    setups = [variation.setup for variation in variations]
+def again_stage(readings: Iterable[Reading]) -> Stage:
+    """Table I under other readings."""
+    setups = [reading.setup for reading in readings]
     traced = _distinct(spec for setup in setups for spec in table_specs(setup, TRACED))
     specs = _distinct(
         spec for setup in setups for spec in (*table_specs(setup, PREDICTIVE), *steady_specs(setup))
     )
-    return Stage("sensitivity", specs, traced)
+    return Stage("again", specs, traced)
 
 
 def repeat_stage(count: int) -> Stage:
@@ -180,16 +183,16 @@ def default_evidence(
         ValueError: an episode failed.
     """
     by_key = {result.spec.key: result for result in played}
-    return replace(_setup_evidence(Setup(), by_key, folder, CONTROLLERS), timed=timed)
+    return replace(_setup_evidence(Setup(), by_key, folder, CONTROLLERS, CONTROLLERS), timed=timed)
 
 
-def varied_evidence(
-    variations: Iterable[Variation], played: Sequence[EpisodeResult], folder: ResultsFolder
-) -> tuple[tuple[Variation, Evidence], ...]:
-    """Evidence of the sensitivity stage.
+def again_evidence(
+    readings: Iterable[Reading], played: Sequence[EpisodeResult], folder: ResultsFolder
+) -> tuple[tuple[Reading, Evidence], ...]:
+    """Evidence of the stage that plays readings again.
 
     Args:
-        variations: those that were played.
+        readings: those that were played.
         played: its results.
         folder: its folder.
 
@@ -198,8 +201,8 @@ def varied_evidence(
     """
     by_key = {result.spec.key: result for result in played}
     return tuple(
-        (variation, _setup_evidence(variation.setup, by_key, folder, PREDICTIVE))
-        for variation in variations
+        (reading, _setup_evidence(reading.setup, by_key, folder, PREDICTIVE, TRACED))
+        for reading in readings
     )
 
 
@@ -225,15 +228,17 @@ def steady_specs(setup: Setup) -> list[EpisodeSpec]:
 
 
 def own_setup(controller: str, setup: Setup) -> Setup:
-    """A setup without the choices that make no difference to a controller.
+    """A setup without the choices that make no difference to a controller, or that it refuses.
 
-    Only the linear MPC has a model of fixed length; the others' episodes serve for all such
-    lengths, and are played once.
+    Only the linear MPC has a model of fixed length and a choice of its sway state; the others'
+    episodes serve for all of these, and are played once.
     """
     if controller == "linear":
         return setup
-    fixed = MpcSettings().model_cable_length
-    return replace(setup, settings=replace(setup.settings, model_cable_length=fixed))
+    common = replace(
+        setup.settings, model_cable_length=MpcSettings().model_cable_length, sway_state=None
+    )
+    return replace(setup, settings=common)
 
 
 def _specs(
@@ -257,9 +262,10 @@ def _setup_evidence(
     by_key: Mapping[str, EpisodeResult],
     folder: ResultsFolder,
     controllers: Sequence[str],
+    traced: Sequence[str],
 ) -> Evidence:
     played = [by_key[spec.key] for spec in table_specs(setup, controllers)]
     steady = [by_key[spec.key] for spec in steady_specs(setup)]
     return Evidence(
-        setup, measured_indices(played, folder, TRACED), measured_indices(steady, folder)
+        setup, measured_indices(played, folder, traced), measured_indices(steady, folder)
     )

@@ -19,8 +19,9 @@ from baselines.evaluation.statistics import (
 )
 from baselines.paper.checks import Finding
 from baselines.paper.claims import CLAIMS, Claim
+from baselines.paper.design import CONFIDENCE, Screening, Turn
 from baselines.paper.evidence import Evidence
-from baselines.paper.sensitivity import Variation
+from baselines.paper.readings import Reading
 
 PAIRS = (
     ("linear", "adaptive"),
@@ -36,13 +37,16 @@ PAIRS = (
 COMPARED = ("IAE", "release_drift")
 """Indices in which they are: those of the paper's Figs. 6 and 7."""
 
-CONFIDENCE = 0.95
-"""Of all intervals; each holds for itself, not for all together."""
-
 RESAMPLING_SEED = 0
 """Seed of the bootstrap."""
 
-Verdict = Literal["reproduced", "not reproduced", "depends"]
+COUNTED = sum(claim.counted for claim in CLAIMS)
+"""Claims in the score."""
+
+OFTEN = 0.1
+"""Share of its changes that turn a claim from which on a point is named [-]."""
+
+Verdict = Literal["reproduced", "not reproduced", "depends", "not varied"]
 
 
 @dataclass(frozen=True)
@@ -52,36 +56,32 @@ class Judgement:
     Attributes:
         claim: the claim.
         default: finding on the default setup.
-        varied: variations of the setup with their findings.
+        turns: how often each open point turns it; none if it was not screened.
+        screened: whether it holds in each reading that was screened.
+        crane: whether it holds in each reading that was played on the MuJoCo crane.
     """
 
     claim: Claim
     default: Finding
-    varied: tuple[tuple[Variation, Finding], ...] = ()
-
-    @property
-    def flips(self) -> tuple[Variation, ...]:
-        """Variations under which the finding is the opposite of the default one."""
-        return tuple(
-            variation for variation, finding in self.varied if finding.holds != self.default.holds
-        )
+    turns: tuple[Turn, ...] = ()
+    screened: tuple[bool, ...] = ()
+    crane: tuple[bool, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
-        """In a word."""
-        if self.flips:
+        """In a word; "reproduced" says that no reading tried turns it, of those that could."""
+        tried = (*self.screened, *self.crane)
+        if self.claim.fixed or not tried:
+            return "not varied"
+        if any(holds != self.default.holds for holds in tried):
             return "depends"
         return "reproduced" if self.default.holds else "not reproduced"
 
     @property
-    def depends_on(self) -> tuple[str, ...]:
-        """Open points of the paper on which the finding depends.
-
-        Those that turn it by themselves; a pair only where neither of its points does.
-        """
-        alone = dict.fromkeys(v.points[0] for v in self.flips if len(v.points) == 1)
-        pairs = [v.points for v in self.flips if len(v.points) > 1 and not alone.keys() & v.points]
-        return (*alone, *dict.fromkeys(" with ".join(points) for points in pairs))
+    def depends_on(self) -> tuple[Turn, ...]:
+        """Points that turn it `OFTEN`, or else the one that does most; the first does most."""
+        turning = sorted((t for t in self.turns if t.turned), key=lambda t: -t.share)
+        return tuple(t for t in turning if t.share >= OFTEN) or tuple(turning[:1])
 
     def as_dict(self) -> dict[str, Any]:
         """The judgement as JSON knows it."""
@@ -91,33 +91,53 @@ class Judgement:
             "section": claim.section,
             "statement": claim.statement,
             "definition": claim.definition,
+            "counted": claim.counted,
             "verdict": self.verdict,
-            "depends_on": list(self.depends_on),
             "default": finding_dict(self.default),
-            "varied": {variation.name: finding_dict(found) for variation, found in self.varied},
+            "turned_by": {
+                t.point: {"turned": t.turned, "of": t.changes, "interval": list(t.interval)}
+                for t in self.turns
+            },
+            "screened": {"holds": sum(self.screened), "of": len(self.screened)},
+            "on_the_crane": {"holds": sum(self.crane), "of": len(self.crane)},
         }
 
 
 def judge(
-    default: Evidence, varied: Sequence[tuple[Variation, Evidence]] = ()
+    default: Evidence,
+    screening: Screening | None = None,
+    again: Sequence[tuple[Reading, Evidence]] = (),
 ) -> tuple[Judgement, ...]:
     """Judges every claim.
 
     Args:
         default: evidence on the default setup; claims about time are left out if nothing was timed.
-        varied: variations of the setup with their evidence.
+        screening: what was screened; None if nothing.
+        again: readings with their evidence on the MuJoCo crane.
     """
-    return tuple(
-        Judgement(
-            claim,
-            claim.check(default),
-            ()
-            if claim.timed
-            else tuple((variation, claim.check(evidence)) for variation, evidence in varied),
-        )
-        for claim in CLAIMS
-        if default.timed or not claim.timed
-    )
+    judgements = []
+    for claim in CLAIMS:
+        if claim.timed and not default.timed:
+            continue
+        turns: tuple[Turn, ...] = ()
+        screened: tuple[bool, ...] = ()
+        if claim.screened and screening:
+            turns = screening.turns(claim.name)
+            screened = tuple(o.holds[claim.name] for o in screening.outcomes.values())
+        crane = () if claim.timed else tuple(claim.check(e).holds for _, e in again)
+        judgements.append(Judgement(claim, claim.check(default), turns, screened, crane))
+    return tuple(judgements)
+
+
+def failing(evidence: Evidence) -> list[int]:
+    """Numbers of the counted claims that fail, from 1; those about time hold unless measured."""
+    return [
+        number
+        for number, claim in enumerate(CLAIMS, start=1)
+        if claim.counted
+        and not (claim.timed and not evidence.timed)
+        and not claim.check(evidence).holds
+    ]
 
 
 def finding_dict(finding: Finding) -> dict[str, Any]:

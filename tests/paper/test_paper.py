@@ -15,28 +15,17 @@ import pytest
 from numpy.typing import NDArray
 
 from baselines.commands.reproduce import main
+from baselines.evaluation.results import ResultsFolder
 from baselines.paper.checks import EQUAL, SIMILAR
+from baselines.paper.stages import defaults_stage
+from baselines.paper.verdicts import COUNTED
+from crane_env.operators.table1 import HOIST_PRESS_DURATION, TABLE_1
 
-VERDICTS = {
-    "linear-oscillates": "reproduced",
-    "linear-cannot-cope": "reproduced",
-    "adaptive-equals-nmpc-a": "reproduced",
-    "sway-is-small": "reproduced",
-    "assumption-b-needs-nmpc": "not reproduced",
-    "horizon-is-1-s": "not reproduced",
-    "acceleration-limit": "reproduced",
-    "linear-worst-iae": "reproduced",
-    "linear-worst-drift": "reproduced",
-    "nmpc-b-reduces-iae": "not reproduced",
-    "nmpc-b-reduces-drift": "reproduced",
-    "similar-iae": "reproduced",
-    "similar-drift": "not reproduced",
-    "table-suffices": "reproduced",
-    "linear-degrades": "reproduced",
-    "varying-mpcs-cope": "reproduced",
-    "no-advantage-of-nmpc": "reproduced",
-}
-"""On the defaults; the claim about computing time is left to `scripts/reproduce_paper.py`."""
+FAILING = {"assumption-b-needs-nmpc", "horizon-is-1-s", "nmpc-b-reduces-iae", "similar-drift"}
+"""Claims that fail on the defaults; the one about computing time is left to the script."""
+
+QUIET_AFTER = 5.0
+"""From so long after the last button on Fig. 4 is looked at [s]."""
 
 Indices = dict[str, dict[str, NDArray[np.float64]]]
 
@@ -64,10 +53,28 @@ def indices(data: dict[str, Any]) -> Indices:
     }
 
 
-def test_the_verdicts_on_the_defaults_stand(data: dict[str, Any]) -> None:
-    found = {claim["claim"]: claim["verdict"] for claim in data["claims"]}
-    measured = {claim["claim"]: claim["default"]["measured"] for claim in data["claims"]}
-    assert found == VERDICTS, measured
+def test_on_the_defaults_14_of_the_16_counted_claims_hold(data: dict[str, Any]) -> None:
+    claims = {claim["claim"]: claim for claim in data["claims"]}
+    measured = {name: claim["default"]["measured"] for name, claim in claims.items()}
+    assert {n for n, c in claims.items() if not c["default"]["holds"]} == FAILING, measured
+    # The script is not asked for times; that a nonlinear MPC takes longer is beyond doubt.
+    counted = [name for name, claim in claims.items() if claim["counted"]]
+    assert len(counted) + 1 == COUNTED == 16
+    assert len({*counted} - FAILING) + 1 == 14
+
+
+def test_in_figure_4_the_linear_mpc_goes_on_swinging_and_no_other_does(folder: Path) -> None:
+    results = ResultsFolder(folder / "defaults")
+    last_button = TABLE_1[0].lower_press + HOIST_PRESS_DURATION
+    swings = {}
+    for spec in defaults_stage().traced:
+        if spec.operator_name == "table1:1":
+            seen = results.trajectory(spec)
+            velocity = seen.payload_velocity[seen.time >= last_button + QUIET_AFTER]
+            swings[spec.controller] = float(np.ptp(velocity))
+    assert swings.pop("linear") > 0.1
+    swings.pop("manual")
+    assert max(swings.values()) < 0.05, swings
 
 
 @pytest.mark.parametrize("index", ["IAE", "release_drift"])

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from baselines.commands.reproduce import main
@@ -19,27 +20,17 @@ from baselines.evaluation.episode_spec import Setup
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.paper.checks import Finding
 from baselines.paper.claims import CLAIMS
-from baselines.paper.evidence import measured_indices, short_cable_oscillation, steady_manoeuvre
-from baselines.paper.report import (
-    plain_data,
-)
-from baselines.paper.sensitivity import (
-    Change,
-    Variation,
-    cost_term,
-    fixed_length,
-    initial_length,
-    prediction_horizon,
-    tail_rule,
-    variations,
-)
+from baselines.paper.design import Outcome, Screening, Turn, outcome
+from baselines.paper.evidence import measured_indices, steady_manoeuvre, tracking
+from baselines.paper.readings import DEFAULT, Reading
+from baselines.paper.report import markdown_report, plain_data
 from baselines.paper.stages import (
     Reproduction,
     Stage,
+    again_stage,
     own_setup,
     play_stage,
     repeat_stage,
-    sensitivity_stage,
     stage_folder,
     table_specs,
 )
@@ -50,6 +41,7 @@ from tests.paper.paper_evidence import agreeing_evidence, scaled
 
 ROOT = Path(__file__).parents[2]
 AGREEING = agreeing_evidence()
+BY_NAME = {claim.name: claim for claim in CLAIMS}
 
 
 def ignore(result: EpisodeResult) -> None:
@@ -74,15 +66,16 @@ def test_random_manoeuvres_come_seed_by_seed_so_that_an_interruption_leaves_whol
     assert specs[:7] == repeat_stage(1).specs
 
 
-def test_a_length_that_only_the_linear_mpc_has_makes_no_other_controller_play_again() -> None:
-    lengths = sensitivity_stage([Variation((fixed_length(x),)) for x in (5.0, 6.0)]).specs
-    again = {spec.controller for spec in lengths if spec.setup.key != Setup().key}
+def test_what_only_the_linear_mpc_has_makes_no_other_controller_play_again() -> None:
+    readings = [Reading(model_length="5 m"), Reading(sway_state="measured")]
+    specs = again_stage(readings).specs
+    again = {spec.controller for spec in specs if spec.setup.key != Setup().key}
     assert again == {"linear"}
     # Twice Table I with and without hoisting for linear, once for those that do not care.
-    assert len(lengths) == 2 * 20 + (5 + 2) * 10
-    pair = Variation((initial_length(6.0), fixed_length(6.0))).setup
-    assert own_setup("adaptive", pair) == Variation((initial_length(6.0),)).setup
-    assert own_setup("linear", pair) == pair
+    assert len(specs) == 2 * 20 + (5 + 2) * 10
+    both = Reading(initial_length=6.0, sway_state="open-loop").setup
+    assert own_setup("adaptive", both) == own_setup("adaptive", Reading(initial_length=6.0).setup)
+    assert own_setup("linear", both) == both
 
 
 def test_what_a_stage_played_is_not_played_again_and_told_once(tmp_path: Path) -> None:
@@ -109,8 +102,10 @@ def test_evidence_is_the_episodes_metrics_in_the_order_of_the_manoeuvres(tmp_pat
     found = measured_indices(played, folder, ("adaptive",))["adaptive"]
     expected = [folder.trajectory(spec).metrics().IAE for spec in specs]
     assert found["IAE"].tolist() == expected
-    oscillations = [short_cable_oscillation(folder.trajectory(spec)).error for spec in specs]
-    assert found["short_cable_error"].tolist() == oscillations
+    for place, seen in enumerate(map(folder.trajectory, specs)):
+        signals = (seen.cable_length, seen.travel_reference, seen.payload_velocity)
+        for name, value in tracking(*signals, 0.02)._asdict().items():
+            np.testing.assert_equal(found[name][place], value)
 
 
 def test_a_failed_episode_is_no_evidence(tmp_path: Path) -> None:
@@ -120,64 +115,42 @@ def test_a_failed_episode_is_no_evidence(tmp_path: Path) -> None:
         measured_indices([failed], ResultsFolder(tmp_path))
 
 
-# Sensitivity
-
-
-@pytest.mark.parametrize("variation", variations("full"), ids=lambda variation: variation.name)
-def test_a_variation_differs_from_the_defaults_in_what_it_says(variation: Variation) -> None:
-    default, varied = Setup(), variation.setup
-    differing = {
-        field.name
-        for part in ("crane", "settings")
-        for field in dataclasses.fields(getattr(default, part))
-        if getattr(getattr(default, part), field.name) != getattr(getattr(varied, part), field.name)
-    }
-    assert differing == {name for c in variation.changes for name in (*c.crane, *c.settings)}
-    assert len(differing) == len(variation.points)
-
-
 # Verdicts
 
-TAIL, TERM, LENGTH = tail_rule("zero"), cost_term("angle"), initial_length(5.0)
 
-
-def judgement(default: bool, *varied: tuple[tuple[Change, ...], bool]) -> Judgement:
-    findings = tuple((Variation(changes), Finding(holds, "")) for changes, holds in varied)
-    return Judgement(CLAIMS[0], Finding(default, ""), findings)
+def judgement(default: bool, *tried: bool, turned: tuple[int, ...] = ()) -> Judgement:
+    points = ("tail", "cost_term", "sway_state")
+    turns = tuple(Turn(p, n, 100) for p, n in zip(points, turned, strict=False))
+    return Judgement(CLAIMS[0], Finding(default, ""), turns, tried)
 
 
 @pytest.mark.parametrize(
     ("found", "verdict", "depends_on"),
     [
-        (judgement(True), "reproduced", ()),
-        (judgement(False), "not reproduced", ()),
-        (judgement(True, ((TAIL,), True), ((TERM, TAIL), True)), "reproduced", ()),
-        (judgement(False, ((TAIL,), False)), "not reproduced", ()),
-        (judgement(True, ((TAIL,), False), ((TERM,), True)), "depends", ("tail rule",)),
-        (judgement(False, ((TAIL,), True)), "depends", ("tail rule",)),
-        # A pair counts where neither of its points turns the finding by itself.
-        (judgement(True, ((TAIL,), False), ((TERM, TAIL), False)), "depends", ("tail rule",)),
+        (judgement(True), "not varied", []),
+        (judgement(True, True, True), "reproduced", []),
+        (judgement(False, False), "not reproduced", []),
+        (judgement(True, True, False, turned=(5, 12, 40)), "depends", ["sway_state", "cost_term"]),
+        (judgement(False, True, turned=(3, 0, 2)), "depends", ["tail"]),
+        (dataclasses.replace(judgement(True), crane=(True, False)), "depends", []),
         (
-            judgement(True, ((TAIL,), False), ((LENGTH, TERM), False)),
-            "depends",
-            ("tail rule", "initial length with cost term"),
+            dataclasses.replace(judgement(True, True), claim=BY_NAME["acceleration-limit"]),
+            "not varied",
+            [],
         ),
     ],
 )
-def test_a_verdict_depends_on_the_points_that_turn_it(
-    found: Judgement, verdict: str, depends_on: tuple[str, ...]
+def test_a_verdict_names_the_points_that_turn_it_and_never_says_more_than_was_varied(
+    found: Judgement, verdict: str, depends_on: list[str]
 ) -> None:
     assert found.verdict == verdict
-    assert found.depends_on == depends_on
+    assert [turn.point for turn in found.depends_on] == depends_on
 
 
-def test_time_is_not_varied_and_without_timing_there_is_no_claim_about_it() -> None:
-    varied = ((Variation((prediction_horizon(50),)), AGREEING),)
-    found = {j.claim.name: j for j in Reproduction(AGREEING, varied).judgements}
-    assert found["nmpc-takes-longer"].varied == ()
-    assert len(found["similar-iae"].varied) == 1
-    untimed = Reproduction(dataclasses.replace(AGREEING, timed={}), varied).judgements
-    assert {j.claim.name for j in untimed} == found.keys() - {"nmpc-takes-longer"}
+def test_without_timing_there_is_no_claim_about_time() -> None:
+    timed = {j.claim.name for j in Reproduction(AGREEING).judgements}
+    untimed = dataclasses.replace(AGREEING, timed={})
+    assert timed - {j.claim.name for j in Reproduction(untimed).judgements} == {"nmpc-takes-longer"}
 
 
 # Repeat
@@ -197,18 +170,33 @@ def test_shares_count_the_manoeuvres_that_meet_a_claim() -> None:
 
 @pytest.fixture(scope="module")
 def reproduced() -> Reproduction:
-    varied = Variation((TAIL, prediction_horizon(50)))
-    turned = dataclasses.replace(scaled(AGREEING, "linear", "IAE", 0.5), setup=varied.setup)
-    return Reproduction(AGREEING, ((varied, turned),), repeat=AGREEING)
+    other = Reading(tail="zero")
+    turned = dataclasses.replace(scaled(AGREEING, "linear", "IAE", 0.5), setup=other.setup)
+    walk: tuple[Outcome, ...] = (outcome(DEFAULT, AGREEING), outcome(other, turned))
+    again = ((DEFAULT, AGREEING), (other, turned))
+    return Reproduction(AGREEING, Screening((walk,), ()), again, repeat=AGREEING)
 
 
 def test_the_data_is_plain_and_complete(reproduced: Reproduction) -> None:
     data = json.loads(json.dumps(plain_data(reproduced), allow_nan=False))
     assert [claim["claim"] for claim in data["claims"]] == [claim.name for claim in CLAIMS]
-    assert {claim["verdict"] for claim in data["claims"]} == {"reproduced", "depends"}
     assert data["default"]["indices"]["ltv"]["IAE"] == AGREEING.of("ltv", "IAE").tolist()
-    assert data["varied"]["u = 0 after N_c, N_p = 50"]["setup"]["settings"]["tail"] == "zero"
+    assert data["again"]["tail u = 0"]["setup"]["settings"]["tail"] == "zero"
+    worst = next(claim for claim in data["claims"] if claim["claim"] == "linear-worst-iae")
+    assert worst["verdict"] == "depends"
+    assert worst["turned_by"]["tail"]["turned"] == worst["turned_by"]["tail"]["of"] == 1
+    assert worst["screened"] == worst["on_the_crane"] == {"holds": 1, "of": 2}
     assert len(data["random_pairs"]) == len(PAIRS) * len(COMPARED)
+
+
+def test_the_report_names_what_turns_a_claim_and_what_was_not_varied(
+    reproduced: Reproduction,
+) -> None:
+    lines = markdown_report(reproduced).splitlines()
+    (iae,) = (line for line in lines if "its IAE always exceeds" in line)
+    assert "**depends** on tail; holds in 50 % of 2 readings" in iae
+    (limit,) = (line for line in lines if "The constraint of" in line)
+    assert "**not varied**: the limit is a constraint" in limit
 
 
 # Script

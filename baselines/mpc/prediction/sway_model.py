@@ -39,6 +39,39 @@ class Sway(NamedTuple):
     rate: float = 0.0
 
 
+class Turn(NamedTuple):
+    """What turns the model in a control period: plain numbers, which compiled code takes as well.
+
+    Attributes:
+        gravity: g [m/s^2].
+        omega: [rad/s].
+        cosine: of omega T.
+        sine: of omega T.
+    """
+
+    gravity: float
+    omega: float
+    cosine: float
+    sine: float
+
+
+def turned(angle: float, rate: float, acceleration: float, turn: Turn) -> tuple[float, float]:
+    """Sway angle [rad] and rate [rad/s] of the model a control period later.
+
+    Args:
+        angle: theta [rad].
+        rate: theta' [rad/s].
+        acceleration: of the trolley over the period [m/s^2].
+        turn: of the model.
+    """
+    rest = -acceleration / turn.gravity
+    error = angle - rest
+    return (
+        rest + turn.cosine * error + turn.sine / turn.omega * rate,
+        turn.cosine * rate - turn.omega * turn.sine * error,
+    )
+
+
 @final
 class SwayModel:
     """Where a controller of fixed length has its sway from.
@@ -47,24 +80,23 @@ class SwayModel:
         crane: gravity and control period.
         settings: length of the model.
         sway_state: "measured", "open-loop" or "corrected".
+
+    Attributes:
+        turn: of the model.
     """
 
-    def __init__(self, crane: CraneParameters, settings: MpcSettings, sway_state: SwayState):
+    def __init__(
+        self, crane: CraneParameters, settings: MpcSettings, sway_state: SwayState
+    ) -> None:
         self._sway_state = sway_state
         self._length = settings.model_cable_length
-        self._gravity = crane.gravity
-        self._omega = math.sqrt(crane.gravity / self._length)
-        self._cosine = math.cos(self._omega * crane.control_period)
-        self._sine = math.sin(self._omega * crane.control_period)
+        omega = math.sqrt(crane.gravity / self._length)
+        angle = omega * crane.control_period
+        self.turn = Turn(crane.gravity, omega, math.cos(angle), math.sin(angle))
 
     def after(self, sway: Sway, acceleration: float) -> Sway:
         """Sway a control period later under an acceleration of the trolley [m/s^2]."""
-        rest = -acceleration / self._gravity
-        error = sway.angle - rest
-        return Sway(
-            rest + self._cosine * error + self._sine / self._omega * sway.rate,
-            self._cosine * sway.rate - self._omega * self._sine * error,
-        )
+        return Sway(*turned(*sway, acceleration, self.turn))
 
     def believed(self, observation: Observation, sway: Sway) -> Observation:
         """What the prediction starts from: what is measured, with the model's sway in its place."""

@@ -1,1 +1,0 @@
-"""Study: what controllers are worth to persons who bring payloads to their places."""

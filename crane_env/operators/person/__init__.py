@@ -1,1 +1,0 @@
-"""Person: an operator who looks at the payload, judges where it will rest, and presses."""
