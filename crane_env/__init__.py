@@ -12,10 +12,12 @@ import gymnasium
 from crane_env.controller import Controller
 from crane_env.episode.metrics import Metrics
 from crane_env.episode.play import run_episode, run_episodes
+from crane_env.episode.practice import practise
 from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import CraneState, Observation
 from crane_env.operators.base import ButtonEvent, Buttons, Operator
 from crane_env.operators.manoeuvre import RandomManoeuvre
+from crane_env.operators.person.person import Person
 from crane_env.operators.registry import make_operator
 from crane_env.operators.script import ButtonScript, read_script, write_script
 from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
@@ -46,12 +48,14 @@ __all__ = [
     "Metrics",
     "Observation",
     "Operator",
+    "Person",
     "RandomButtons",
     "RandomManoeuvre",
     "StageCost",
     "Table1Manoeuvre",
     "Trajectory",
     "make_operator",
+    "practise",
     "read_script",
     "run_episode",
     "run_episodes",

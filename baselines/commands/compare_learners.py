@@ -16,7 +16,7 @@ import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,9 @@ from baselines.commands.terminal import (
     run,
 )
 from baselines.evaluation.comparison import check_controllers, compare
+from baselines.evaluation.drawing import draw
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
-from baselines.evaluation.figures import learning_figure, save_figure
+from baselines.evaluation.figures import learning_figure
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.statistics import paired_difference
 from baselines.evaluation.tables import markdown_table
@@ -44,6 +45,10 @@ from crane_env.operators.registry import OperatorSpec
 from crane_env.operators.table1 import TABLE_1
 from crane_env.stage_cost import StageCost
 from crane_env.support.atomic_file import atomic_file
+from crane_env.support.extras import require
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PROGRAM = "oilcrane compare-learners"
 
@@ -60,6 +65,7 @@ DISTRIBUTION_SHIFTS: dict[str, tuple[str, CraneParameters]] = {
     "payload 500 kg": ("manoeuvre", CraneParameters(payload_mass=500.0)),
     "soft drive, 20 rad/s": ("manoeuvre", CraneParameters(drive_bandwidth=20.0)),
     "random buttons": ("random", CraneParameters()),
+    "stress": ("stress", CraneParameters()),
 }
 """Operator and crane of each departure from what was trained."""
 
@@ -73,6 +79,12 @@ COLUMNS = {
     "limit_violations": ("limit violations", 1.0, 2),
 }
 """Index to heading, factor and decimals."""
+
+LEARNING_CURVES = "rl_learning_curves"
+"""Name of the figure beside the report."""
+
+Run = tuple[dict[str, Any], list[dict[str, float]]]
+"""Card and learning curve of a training run."""
 
 Play = Callable[[Sequence[EpisodeSpec], str], list[EpisodeResult]]
 """Plays episodes under a title."""
@@ -118,33 +130,36 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     """Tries what can be wrong; returns the comparison.
 
     Raises:
-        ValueError: an option that means nothing, or a value out of range.
+        ValueError: an option that means nothing, a value out of range, or a card that is none.
         ImportError: a package is missing; the message names the extra that brings it.
-        OSError: a folder or file that cannot be written.
+        OSError: a folder or file that cannot be read or written.
     """
     if REFERENCE not in options.controllers:
         raise ValueError(f"controllers must include {REFERENCE!r}, the reference.")
     if min(options.manoeuvres, options.shifted_manoeuvres) < 2:
         raise ValueError("manoeuvres and shifted_manoeuvres must be at least 2.")
     processes(options.jobs)
+    runs = trained_runs(options.runs)
+    if runs:
+        require("matplotlib.figure", extra="results")
     check_controllers(episode_specs(options.controllers, ["manoeuvre"], [0], Setup()))
     ResultsFolder(options.output).prepare()
     options.report.parent.mkdir(parents=True, exist_ok=True)
     check_writable("report", options.report)
-    return functools.partial(compare_learners, options, command)
+    return functools.partial(compare_learners, options, runs, command)
 
 
-def compare_learners(options: Options, command: Sequence[str]) -> None:
+def compare_learners(options: Options, runs: Sequence[Run], command: Sequence[str]) -> None:
     """Plays everything and writes the report.
 
     Raises:
-        FailedError: an episode failed.
+        FailedError: an episode or the figure failed.
         KeyboardInterrupt: interrupted; with where the finished episodes are.
     """
     play = functools.partial(play_behind_bar, options, command)
     try:
         sections = [
-            *training_sections(options),
+            *training_section(runs),
             *table1_section(options, play),
             *unseen_section(options, play),
             *shift_section(options, play),
@@ -161,19 +176,39 @@ def compare_learners(options: Options, command: Sequence[str]) -> None:
     with atomic_file(options.report) as partial:
         partial.write_text(text.lstrip() + "\n", encoding="utf-8")
     print(f"Report: {options.report}.")
+    if runs:
+        picture = options.report.parent / LEARNING_CURVES
+        drawn = draw({picture: lambda: learning_curves(runs)}, ["png"])
+        if drawn.failures:
+            raise FailedError(*drawn.failures)
 
 
-def training_sections(options: Options) -> list[str]:
-    """Cost and outcome of every training run, and the learning curves."""
+def trained_runs(folder: Path) -> list[Run]:
+    """Card and learning curve of every training run in a folder.
+
+    Raises:
+        ValueError: a card is no JSON.
+        ImportError: there are runs, but a package to read them is missing.
+        OSError: a file cannot be read.
+    """
+    files = sorted(folder.glob("*/policy.json"))
+    if not files:
+        return []
     from baselines.rl.recorder import CURVE, read_curve
 
-    cards = sorted(options.runs.glob("*/policy.json"))
-    if not cards:
+    return [
+        (json.loads(file.read_text(encoding="utf-8")), read_curve(file.parent / CURVE))
+        for file in files
+    ]
+
+
+def training_section(runs: Sequence[Run]) -> list[str]:
+    """Cost and outcome of every training run."""
+    if not runs:
         return []
-    rows, runs = [], dict[str, list[Any]]()
+    rows = []
     limits = means_on_table1()
-    for file in cards:
-        card = json.loads(file.read_text(encoding="utf-8"))
+    for card, _ in runs:
         means = table1_means(card)
         wins = all(means[index] < limits[index] for index in ("IAE", "release_drift"))
         rows.append(
@@ -188,20 +223,17 @@ def training_sections(options: Options) -> list[str]:
                 "yes" if wins else "no",
             ]
         )
-        runs.setdefault(card["algorithm"], []).append(read_curve(file.parent / CURVE))
     rows.append(
         ["adaptive MPC", "", "", ""]
         + [f"{limits[index]:.3f}" for index in ("IAE", "release_drift", "stage_cost")]
         + [""]
     )
-    figure = options.report.parent / "rl_learning_curves.png"
-    save_figure(learning_figure(runs, validation_reference()), figure)
     headings = ["algorithm", "seed", "steps", "minutes", "IAE [m]", "release drift [m]"]
     headings += ["stage cost [m²/s]", "beats adaptive on both"]
     return [
         "## Training",
         "",
-        f"![Validation against training steps]({figure.name})",
+        f"![Validation against training steps]({LEARNING_CURVES}.png)",
         "",
         "Means over Table I of the policy that did best on the validation manoeuvres of its own "
         "run; minutes of wall time, evaluations included.",
@@ -209,6 +241,14 @@ def training_sections(options: Options) -> list[str]:
         markdown_table(headings, rows),
         "",
     ]
+
+
+def learning_curves(runs: Sequence[Run]) -> Figure:
+    """How the runs learned."""
+    curves: dict[str, list[Any]] = {}
+    for card, curve in runs:
+        curves.setdefault(card["algorithm"], []).append(curve)
+    return learning_figure(curves, validation_reference())
 
 
 def means_on_table1() -> dict[str, float]:

@@ -22,6 +22,7 @@ from baselines.commands.terminal import (
     table_console,
 )
 from baselines.evaluation.comparison import check_controllers, compare
+from baselines.evaluation.drawing import Drawn, Format
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.gallery import draw_gallery
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
@@ -44,15 +45,15 @@ class Options:
     """Drives controllers through operators' manoeuvres and compares how well they do.
 
     Every controller meets every operator under every seed. Prints tables; writes metrics and
-    trajectories (Parquet), the paper's Figs. 3 to 7 (PNG) and a manifest (JSON). Ctrl-C keeps the
+    trajectories (Parquet), the paper's Figs. 3 to 7 and a manifest (JSON). Ctrl-C keeps the
     finished episodes, and the same command then goes on from there.
 
     Attributes:
         controllers: names of controllers; package.module:factory for one of your own.
         operators: who presses the buttons: table1 (all ten manoeuvres of the paper's Table I),
-            table1:N (one of them), manoeuvre, random, or script:FILE (CSV or JSON).
+            table1:N (one of them), manoeuvre, random, stress, or script:FILE (CSV or JSON).
         seeds: seeds of the episodes: numbers, or FIRST:END for all from FIRST to before END. They
-            matter to the operators manoeuvre and random only.
+            matter to the operators manoeuvre, random and stress only.
         parameters: the crane: a preset (paper or field), or a JSON object, or a file with one, of
             the fields of CraneParameters that differ from the paper's.
         nominal: the crane that the controllers believe in, likewise; None is the one that is
@@ -64,6 +65,7 @@ class Options:
         jobs: number of processes; None is one a core.
         max_steps: length of an episode in control periods of 20 ms; None is 1250, 25 s.
         figures: whether to draw the figures.
+        format: of the figures; several may be given.
     """
 
     controllers: tuple[str, ...] = ("manual", "linear", "adaptive", "nmpc-a", "nmpc-b", "ltv")
@@ -76,6 +78,7 @@ class Options:
     jobs: int | None = None
     max_steps: int | None = None
     figures: bool = True
+    format: tuple[Format, ...] = ("png",)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -105,7 +108,8 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     check_controllers(specs)
     folder = ResultsFolder(options.output)
     folder.prepare()
-    return functools.partial(evaluate, specs, folder, jobs, command, options.figures)
+    formats = options.format if options.figures else ()
+    return functools.partial(evaluate, specs, folder, jobs, command, formats)
 
 
 def evaluate(
@@ -113,12 +117,12 @@ def evaluate(
     folder: ResultsFolder,
     jobs: int,
     command: Sequence[str],
-    figures: bool,
+    formats: Sequence[Format],
 ) -> None:
     """Plays the episodes, shows what they came to and says where everything is.
 
     Raises:
-        FailedError: some episodes failed.
+        FailedError: some episodes or figures failed.
         KeyboardInterrupt: interrupted; with the number of episodes that are kept.
     """
     try:
@@ -130,9 +134,8 @@ def evaluate(
             f"{kept} of {len(specs)} episodes are kept in {folder.path}, and the same command goes "
             "on from there"
         ) from None
-    drawn = draw_gallery(results, folder) if figures else []
     print_tables(results)
-    report(results, folder, drawn)
+    report(results, folder, draw_gallery(results, folder, formats))
 
 
 def crane_parameters(given: str, name: str) -> CraneParameters:
@@ -206,13 +209,11 @@ def print_tables(results: Sequence[EpisodeResult]) -> None:
         console.print()
 
 
-def report(
-    results: Sequence[EpisodeResult], folder: ResultsFolder, figures: Sequence[Path]
-) -> None:
+def report(results: Sequence[EpisodeResult], folder: ResultsFolder, drawn: Drawn) -> None:
     """Says where everything is and what went wrong.
 
     Raises:
-        FailedError: some episodes failed.
+        FailedError: some episodes or figures failed.
     """
     reused = sum(result.reused for result in results)
     if reused:
@@ -223,7 +224,7 @@ def report(
             f"{folder.path} also keeps episodes of {len(others)} other setup(s) (parameters, "
             "settings, code); they lie apart and have no part in this."
         )
-    files = [folder.metrics_file, *figures[:1], *figures[-1:], folder.manifest_file]
+    files = [folder.metrics_file, *drawn.files[:1], *drawn.files[-1:], folder.manifest_file]
     print(f"Results: {', '.join(map(str, files))}.")
-    if failures := failure_lines(results):
+    if failures := [*failure_lines(results), *drawn.failures]:
         raise FailedError(*failures)

@@ -11,12 +11,12 @@ import functools
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from baselines.commands.terminal import Job, run
-from baselines.evaluation.figures import save_figure
+from baselines.evaluation.drawing import INK, legend_above, panels_below, save_figure
 from baselines.evaluation.tables import markdown_table
 from baselines.mpc.cost_table import first_move_errors
 from baselines.mpc.linear import CostModel, adaptive_cost, time_varying_cost
@@ -25,6 +25,10 @@ from baselines.mpc.settings import MpcSettings
 from baselines.mpc.tabulated import AdaptiveTable, LengthGrid, LengthRateGrid, TimeVaryingTable
 from crane_env.parameters import CraneParameters
 from crane_env.support.atomic_file import atomic_file
+from crane_env.support.extras import require
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PROGRAM = "oilcrane table-memory"
 PAGE = Path("docs/tabulated.md")
@@ -44,6 +48,20 @@ LENGTH_RATE_GRIDS = tuple(
 
 Cables = list[tuple[float, float]]
 """Lengths [m] and rates [m/s]."""
+
+INTERPOLATIONS: dict[str, dict[str, Any]] = {
+    "nearest": {"color": "#7a7a7a", "marker": "s", "markersize": 3.2, "linewidth": 1.0},
+    "linear": {"color": "#d55e00", "marker": "o", "markersize": 3.2, "linewidth": 1.0},
+    "cubic": {"color": "#0072b2", "marker": "^", "markersize": 3.2, "linewidth": 1.0},
+}
+"""How each is drawn."""
+
+PARTS = {
+    "-": "tabulated",
+    "--": "tabulated-ltv, hoist runs on",
+    ":": "tabulated-ltv, hoist stops",
+}
+"""Line and name of each part of a table."""
 
 LENGTH_HEADS = ("interpolation", "lengths", "kB", "worst", "median")
 LENGTH_RATE_HEADS = (
@@ -148,28 +166,19 @@ def markdown(measurements: Sequence[Measurement], heads: Sequence[str]) -> str:
 
 
 def error_figure(tabulated: Sequence[Measurement], tabulated_ltv: Sequence[Measurement]) -> Figure:
-    """Worst error over memory, a line an interpolation and part."""
-    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
-    axes = figure.add_subplot()
-    for rows, names, style in (
-        (tabulated, ["tabulated"], "o-"),
-        (tabulated_ltv, ["tabulated-ltv, hoist runs on", "tabulated-ltv, hoist stops"], "s--"),
-    ):
-        for part, name in enumerate(names):
-            for interpolation in dict.fromkeys(row.grid.interpolation for row in rows):
-                line = [row for row in rows if row.grid.interpolation == interpolation]
-                axes.loglog(
-                    [row.memory / 1000 for row in line],
-                    [row.worst[part] for row in line],
-                    style,
-                    markersize=3.0,
-                    linewidth=1.2,
-                    label=f"{name}, {interpolation}",
-                )
+    """Worst error over memory: a marker for each interpolation, a line for each part."""
+    figure, (axes,) = panels_below(["worst error of the first move [m/s²]"], [2.4])
+    for interpolation, look in INTERPOLATIONS.items():
+        axes.plot([], [], linestyle="none", label=interpolation, **look)
+        parts = ((tabulated, 0), (tabulated_ltv, 0), (tabulated_ltv, 1))
+        for dashes, (rows, part) in zip(PARTS, parts, strict=True):
+            line = [row for row in rows if row.grid.interpolation == interpolation]
+            memory = [row.memory / 1000 for row in line]
+            axes.loglog(memory, [row.worst[part] for row in line], linestyle=dashes, **look)
+    for dashes, name in PARTS.items():
+        axes.plot([], [], color=INK, linestyle=dashes, linewidth=1.0, label=name)
     axes.set_xlabel("memory [kB]")
-    axes.set_ylabel("worst error of the first move [m/s²]")
-    axes.grid(visible=True, color="#e4e4e4", linewidth=0.7)
-    figure.legend(loc="outside right upper", frameon=False, fontsize=7.0)
+    legend_above(figure, [axes], columns=2)
     return figure
 
 
@@ -191,11 +200,13 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
 
     Raises:
         ValueError: it is not there, or has no place for the tables.
+        ImportError: matplotlib is missing; the message names the extra.
     """
     if not options.page.is_file() or "<!-- tabulated -->" not in options.page.read_text("utf-8"):
         raise ValueError(
             f"page must be the file docs/tabulated.md of the repository, not {str(options.page)!r}."
         )
+    require("matplotlib.figure", extra="results")
     return functools.partial(write, options.page)
 
 
@@ -208,5 +219,5 @@ def write(file: Path) -> None:
     page = with_table(page, "tabulated-ltv", markdown(tabulated_ltv, LENGTH_RATE_HEADS))
     with atomic_file(file) as partial:
         partial.write_text(page, encoding="utf-8")
-    save_figure(error_figure(tabulated, tabulated_ltv), file.with_suffix(".png"))
+    save_figure(error_figure(tabulated, tabulated_ltv), file.with_suffix(".png"), "png")
     print(f"{file} and its figure are up to date.")

@@ -1,8 +1,9 @@
 """Terminal: what all commands share, from reading the options to the exit code.
 
     0    done
-    1    failed: some episodes, or a file that cannot be written; what was finished is kept
-    2    the input is wrong, or a package is missing
+    1    failed after the start: some episodes, a file that cannot be written; what was finished is
+         kept
+    2    the input is wrong or a package is missing, and nothing was started
     130  interrupted, by Ctrl-C or SIGTERM
 
 Whatever goes wrong is told in one line on standard error.
@@ -85,10 +86,9 @@ def run(
             return ended(program, 130, "; ".join(("interrupted", *map(str, interrupt.args))) + ".")
         except FailedError as failed:
             return ended(program, 1, *map(str, failed.args))
-        except (ValueError, ImportError) as error:
-            return ended(program, 2, str(error))
-        except OSError as error:
-            return ended(program, 1 if started else 2, sentence(error))
+        except (ValueError, ImportError, OSError) as error:
+            told = sentence(error) if isinstance(error, OSError) else str(error)
+            return ended(program, 1 if started else 2, told)
         except Exception as error:  # a fault of the program: the place where it is helps to mend it
             place = extract_tb(error.__traceback__)[-1]
             fault = f"{type(error).__name__}: {error} ({place.filename}, line {place.lineno})"

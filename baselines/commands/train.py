@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from baselines.commands.evaluate import crane_parameters
-from baselines.commands.terminal import Job, progress_bars, run
+from baselines.commands.terminal import Job, check_writable, progress_bars, run
 from baselines.rl.settings import TrainingSettings
-from crane_env.parameters import CraneParameters
-from crane_env.support.extras import require
 
 PROGRAM = "oilcrane train"
 
@@ -73,38 +71,43 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     """Tries what can be wrong; returns the training of every run, or the export.
 
     Raises:
-        ValueError: an option that means nothing, or a value out of range.
+        ValueError: an option that means nothing, a value out of range, hyperparameters that the
+            algorithm does not know, a folder with another run, or a model that is none.
         ImportError: a package is missing; the message names the extra that brings it.
-        OSError: the model to export is not there.
+        OSError: the model to export is not there, or a file or folder cannot be written.
     """
     if options.export is not None:
         if not options.export.is_file():
             raise FileNotFoundError(f"There is no model {str(options.export)!r}.")
         given = options.parameters
         crane = None if given is None else crane_parameters(given, "parameters")
-        return functools.partial(export, options.export, options, crane, command)
+        from baselines.rl.export import exporter
+
+        write = exporter(
+            options.export, algorithm=options.algorithm, crane=crane, statistics=options.statistics
+        )
+        options.policy.parent.mkdir(parents=True, exist_ok=True)
+        check_writable("policy", options.policy)
+        return functools.partial(export, write, options.policy, command)
     if options.parameters is not None or options.statistics is not None:
         raise ValueError("parameters and statistics belong to --export.")
-    runs = all_settings(options)
-    require("stable_baselines3", extra="rl")
+    runs = {
+        options.output / f"{settings.algorithm}-seed{settings.seed}": settings
+        for settings in all_settings(options)
+    }
+    from baselines.rl.training import check_runs
+
+    check_runs(runs)
+    options.output.mkdir(parents=True, exist_ok=True)
     return functools.partial(train_all, runs, options.output, command)
 
 
 def export(
-    model: Path, options: Options, crane: CraneParameters | None, command: Sequence[str]
+    write: Callable[[Path, Sequence[str]], object], policy: Path, command: Sequence[str]
 ) -> None:
     """Exports a trained policy with its card."""
-    from baselines.rl.export import export_file
-
-    export_file(
-        model,
-        options.policy,
-        algorithm=options.algorithm,
-        command=command,
-        crane=crane,
-        statistics=options.statistics,
-    )
-    print(f"Policy: {options.policy}, card: {options.policy.with_suffix('.json')}.")
+    write(policy, command)
+    print(f"Policy: {policy}, card: {policy.with_suffix('.json')}.")
 
 
 def all_settings(options: Options) -> list[TrainingSettings]:
@@ -119,6 +122,8 @@ def all_settings(options: Options) -> list[TrainingSettings]:
         raise ValueError(f"hyperparameters must be a JSON object: {error}.") from error
     if not isinstance(hyperparameters, dict):
         raise ValueError(f"hyperparameters must be a JSON object, not {options.hyperparameters!r}.")
+    if not options.seeds:
+        raise ValueError("seeds must be at least one.")
     return [
         TrainingSettings(
             algorithm=options.algorithm,
@@ -135,15 +140,15 @@ def all_settings(options: Options) -> list[TrainingSettings]:
     ]
 
 
-def train_all(runs: Sequence[TrainingSettings], output: Path, command: Sequence[str]) -> None:
+def train_all(runs: Mapping[Path, TrainingSettings], output: Path, command: Sequence[str]) -> None:
     """Trains one run after the other.
 
     Raises:
         KeyboardInterrupt: interrupted; with where the checkpoints are.
     """
     try:
-        for settings in runs:
-            train_one(settings, output / f"{settings.algorithm}-seed{settings.seed}", command)
+        for folder, settings in runs.items():
+            train_one(settings, folder, command)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
             f"the same command goes on from the last checkpoint in {output}"

@@ -1,228 +1,218 @@
 """Figures of a comparison: the paper's Figs. 3 to 7, redrawn, and how learning went.
 
-Every function takes what it draws and returns a new matplotlib `Figure`; none touches a file, a
-screen or matplotlib's global state. A controller has the same colour in all of them.
+Every function takes what it draws and returns a new matplotlib `Figure`, most of them as wide as a
+column of a journal; none touches a file, a screen or matplotlib's global state. What would dwarf
+the others, as the crane without help does, has a panel of its own.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+import statistics
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.registry import CONTROLLERS
+from baselines.evaluation.drawing import (
+    BROKEN,
+    FONT_SIZE,
+    INK,
+    controller_styles,
+    legend_above,
+    panels_below,
+)
+from crane_env.episode.metrics import release_step
 from crane_env.episode.trajectory import Trajectory
-from crane_env.support.atomic_file import atomic_file
-from crane_env.support.extras import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = (
-    "#7a7a7a",
-    "#d55e00",
-    "#0072b2",
-    "#e69f00",
-    "#56b4e9",
-    "#009e73",
-    "#cc79a7",
-    "#332288",
-)
-"""Okabe and Ito's colours, which colour-blind readers can tell apart; yellow left out for grey."""
-
-HATCHES = ("", "///", "...", "xxx")
-"""Told apart by these, should there be more controllers than colours."""
-
-INK = "#222222"
-"""Axes, text, and what belongs to no controller."""
 MARK_COLOUR = "#a00000"
-"""Instants and limits."""
-WIDTH = 8.0
-"""Width of every figure [inch]."""
-PANEL_HEIGHT = 1.4
-"""Height of one of many panels [inch]."""
-RESOLUTION = 160
-"""Of the PNG files [dots/inch]."""
-FONT_SIZE = 10.0
-"""[point]."""
-LEGEND_COLUMNS = 7
-"""Entries of a legend beside each other."""
-LABEL_ROOM = 0.03
-"""Room that the label of an instant takes, as a share of the time axis."""
-MOST_LABELLED_BARS = 40
-"""So many bars have their value written on them."""
+"""Instants."""
+SHADE = "#eeeeee"
+"""Behind what another panel enlarges, and behind every other operator."""
+GROUP_WIDTH = 0.8
+"""Of the marks for one operator, as a share of the room for each."""
+MOST_LETTERS = 55
+"""Names of operators that need more room are written aslant."""
+LUCK = "Hollow: low by luck; the payload still swings at the end."
+"""A note."""
+COMPARED_WITH = "adaptive"
+"""The paper's recommendation, from which differences are taken."""
+AROUND_RELEASE = (-0.5, 6.5)
+"""What is enlarged, in times after the release of the travel button [s]."""
+APART = 2.0
+"""Motions that span so many times what is usual are drawn apart."""
+APART_MEAN = 0.75
+"""So are indices so far from the others' for some operator, as a share of what is usual."""
+NEAR_LIMIT = 0.9
+"""Limits are drawn where so much of them is used."""
 LEARNING = {
-    "stage_cost": "Stage cost [m²/s]",
+    "stage_cost": "stage cost [m²/s]",
     "IAE": "IAE [m]",
-    "release_drift": "Release drift [m]",
+    "release_drift": "release drift [m]",
 }
 """Indices of the learning figure and their labels."""
 LEARNING_CEILING = 2.0
 """Its axes end at so many times the reference: before it, nothing has been learned."""
 
+Lines = dict[str, NDArray[np.float64]]
+"""Controller or label to values over the control periods of an episode."""
 
-def controller_colours(controllers: Iterable[str]) -> dict[str, str]:
-    """A colour for each controller: by its place in the registry, if no other has that colour."""
-    names = list(dict.fromkeys(controllers))
-    registered = [name for name in CONTROLLERS if name in names]
-    colours: dict[str, str] = {}
-    for name in (*registered, *(name for name in names if name not in registered)):
-        home = list(CONTROLLERS).index(name) if name in CONTROLLERS else len(CONTROLLERS)
-        turned = [COLOURS[(home + turn) % len(COLOURS)] for turn in range(len(COLOURS))]
-        free = [colour for colour in turned if colour not in colours.values()]
-        colours[name] = (free or turned)[0]
-    return colours
+
+@dataclass(frozen=True)
+class Panel:
+    """Motions of several controllers over time.
+
+    Attributes:
+        title: with the unit.
+        lines: of the controllers.
+        marks: what belongs to no controller.
+        at_the_release: show only what happens there.
+    """
+
+    title: str
+    lines: Lines
+    marks: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    at_the_release: bool = False
 
 
 def reference_figure(
-    trajectory: Trajectory, title: str, instants: Mapping[str, float] | None = None
+    trajectory: Trajectory, manoeuvre: str, instants: Mapping[str, float] | None = None
 ) -> Figure:
     """Fig. 3: cable length and travel reference over time.
 
     Args:
         trajectory: of any controller; the operator does not look at the payload.
-        title: of the figure.
+        manoeuvre: what the operator drives, in words.
         instants: label to time [s] of instants to mark, such as t_1 to t_4; those after the end
             are left out.
     """
-    figure, (length, reference) = _panels(2, 4.2, title)
-    length.plot(trajectory.time, trajectory.cable_length, color=INK, linewidth=1.8)
-    length.set_ylabel("cable length [m]")
-    length.set_ylim(bottom=0.0)
-    reference.step(
-        trajectory.time, trajectory.travel_reference, where="post", color=INK, linewidth=1.8
+    figure, (length, reference) = panels_below(
+        ["cable length [m]", "travel reference [m/s]"], [1.0, 1.0]
     )
-    reference.set_ylabel("travel reference [m/s]")
+    length.plot(trajectory.time, trajectory.cable_length, color=INK, linewidth=1.2)
+    length.set_ylim(bottom=0.0)
+    reference.plot(
+        trajectory.time, trajectory.travel_reference, color=INK, linewidth=1.2, ds="steps-post"
+    )
     marked = {
         label: time for label, time in (instants or {}).items() if time <= trajectory.time[-1]
     }
     for label, time in marked.items():
         for axes in (length, reference):
-            axes.axvline(time, color=MARK_COLOUR, linewidth=0.9, linestyle=(0, (4, 3)))
-        length.text(
-            time,
-            1.02,
+            axes.axvline(time, color=MARK_COLOUR, **BROKEN)
+        length.annotate(
             label,
-            transform=length.get_xaxis_transform(),
-            ha=_aside(time, marked.values(), LABEL_ROOM * trajectory.time[-1]),
-            va="bottom",
+            (time, 0.0),
+            (1.5, 3.0),
+            xycoords=length.get_xaxis_transform(),
+            textcoords="offset points",
             fontsize=FONT_SIZE,
             color=MARK_COLOUR,
         )
-    _over_time(reference, trajectory)
+    _over_time([length, reference], trajectory, manoeuvre)
     return figure
 
 
-def velocity_figure(trajectories: Mapping[str, Trajectory], title: str) -> Figure:
-    """Fig. 4: travel reference and payload velocity, one panel a controller.
+def velocity_figure(trajectories: Mapping[str, Trajectory], manoeuvre: str) -> Figure:
+    """Fig. 4: payload velocities over the travel reference, their differences, and the release.
 
     Args:
         trajectories: controller to its trajectory, all of the same operator.
-        title: of the figure.
+        manoeuvre: what the operator drives, in words.
     """
-    figure, panels = _panels(len(trajectories), 1.0 + PANEL_HEIGHT * len(trajectories), title)
-    colours = controller_colours(trajectories)
-    for axes, (name, trajectory) in zip(panels, trajectories.items(), strict=True):
-        axes.step(
-            trajectory.time,
-            trajectory.travel_reference,
-            where="post",
-            color=INK,
-            linewidth=1.0,
-            linestyle=(0, (4, 2)),
-            label="travel reference",
-        )
-        axes.plot(
-            trajectory.time,
-            trajectory.payload_velocity,
-            color=colours[name],
-            linewidth=1.6,
-            label="payload velocity",
-        )
-        _name_panel(axes, name, colours[name])
-    return _finished(figure, panels, "velocity [m/s], scaled by panel", trajectories)
+    clock = max(trajectories.values(), key=len)
+    far, near = _split({name: run.payload_velocity for name, run in trajectories.items()})
+    reference = {"travel reference": clock.travel_reference}
+    label = "payload velocity [m/s]"
+    panels = [
+        Panel(f"{', '.join(far)}: {label}", far, reference),
+        Panel(label, near, reference),
+        *_differences(near),
+        Panel(f"{label}, at the release", near, reference, at_the_release=True),
+    ]
+    return _motion_figure(panels, clock, manoeuvre)
 
 
-def acceleration_figure(trajectories: Mapping[str, Trajectory], title: str) -> Figure:
-    """Fig. 5: trolley acceleration with its limits, one panel a controller.
+def acceleration_figure(trajectories: Mapping[str, Trajectory], manoeuvre: str) -> Figure:
+    """Fig. 5: trolley accelerations, each panel scaled to what is used of the limits.
 
     Args:
         trajectories: controller to its trajectory, all of the same operator.
-        title: of the figure.
+        manoeuvre: what the operator drives, in words.
     """
-    figure, panels = _panels(len(trajectories), 1.0 + PANEL_HEIGHT * len(trajectories), title)
-    colours = controller_colours(trajectories)
-    for axes, (name, trajectory) in zip(panels, trajectories.items(), strict=True):
-        limit = trajectory.parameters.acceleration_max
-        for side in (-limit, limit):
-            axes.axhline(
-                side, color=MARK_COLOUR, linewidth=1.0, linestyle=(0, (4, 2)), label="limits"
-            )
-        axes.step(
-            trajectory.time,
-            trajectory.acceleration,
-            where="post",
-            color=colours[name],
-            linewidth=1.4,
-            label="trolley acceleration",
-        )
-        axes.set_ylim(-1.25 * limit, 1.25 * limit)
-        _name_panel(axes, name, colours[name])
-    return _finished(figure, panels, "trolley acceleration [m/s²]", trajectories)
+    clock = max(trajectories.values(), key=len)
+    far, near = _split({name: run.acceleration for name, run in trajectories.items()})
+    label, limit = "trolley acceleration [m/s²]", clock.parameters.acceleration_max
+    panels = []
+    for title, lines in ((f"{', '.join(far)}: {label}", far), (label, near)):
+        if any(np.abs(line).max() > NEAR_LIMIT * limit for line in lines.values()):
+            bound = np.full(len(clock), limit)
+            panels.append(Panel(title, lines, {"limits": bound, "_lower": -bound}))
+        else:
+            panels.append(Panel(f"{title}; limits ±{limit:g}", lines))
+    panels.append(Panel(f"{label}, at the release", near, at_the_release=True))
+    return _motion_figure(panels, clock, manoeuvre)
 
 
 def index_figure(
-    values: Mapping[str, Mapping[str, NDArray[np.float64]]], label: str, title: str
+    values: Mapping[str, Mapping[str, NDArray[np.float64]]],
+    label: str,
+    lucky: Mapping[str, Collection[str]] | None = None,
 ) -> Figure:
-    """Figs. 6 and 7: one index as bars, a group an operator, a bar a controller.
-
-    A bar is the mean over the seeds; with several, its whisker is their standard deviation. An
-    operator for which the index is not defined has no bar.
+    """Figs. 6 and 7: an index by operator and controller; mean and standard deviation over seeds.
 
     Args:
         values: controller, operator, the index over the seeds; NaN where it is not defined.
         label: of the index, with its unit.
-        title: of the figure.
+        lucky: controller to operators for whom its index is low by luck of the swing only: hollow,
+            and a note says so.
     """
-    figure, (axes,) = _panels(1, 3.6, title)
     operators = list(dict.fromkeys(name for row in values.values() for name in row))
-    colours = controller_colours(values)
-    width = 0.8 / len(values)
-    for place, (controller, row) in enumerate(values.items()):
-        samples = {
-            operators.index(operator): sample[~np.isnan(sample)] for operator, sample in row.items()
-        }
-        defined = {group: sample for group, sample in samples.items() if sample.size}
-        means = [sample.mean() for sample in defined.values()]
-        many = all(sample.size > 1 for sample in defined.values())
-        bars = axes.bar(
-            np.array(list(defined)) + (place - (len(values) - 1) / 2) * width,
-            means,
-            width,
-            yerr=[sample.std(ddof=1) for sample in defined.values()] if many else None,
-            color=colours[controller],
-            hatch=HATCHES[place // len(COLOURS) % len(HATCHES)],
-            edgecolor="white",
-            linewidth=0.5,
-            error_kw={"elinewidth": 1.0, "ecolor": INK, "capsize": 2.0},
-            label=controller,
-        )
-        if len(values) * len(operators) <= MOST_LABELLED_BARS:
-            numbers = [f"{mean:.2f}" for mean in means]
-            axes.bar_label(bars, numbers, rotation=90.0, padding=3.0, fontsize=0.7 * FONT_SIZE)
-    axes.margins(y=0.12)
-    axes.set_ylabel(label, fontsize=FONT_SIZE)
-    axes.set_xlabel("operator", fontsize=FONT_SIZE)
-    axes.set_xticks(range(len(operators)), operators)
-    if sum(map(len, operators)) > 90:
-        axes.tick_params(axis="x", labelrotation=30.0)
-    axes.grid(visible=False, axis="x")
-    axes.set_xlim(-0.6, len(operators) - 0.4)
-    _legend(figure, *axes.get_legend_handles_labels(), "outside lower center")
+    means, deviations = {}, {}
+    for name, row in values.items():
+        samples = [row.get(operator, np.empty(0)) for operator in operators]
+        samples = [sample[~np.isnan(sample)] for sample in samples]
+        means[name] = np.array([sample.mean() if sample.size else np.nan for sample in samples])
+        spread = [sample.std(ddof=1) if sample.size > 1 else np.nan for sample in samples]
+        deviations[name] = np.array(spread)
+    *far, near = _tiers(means)
+    groups = [*far, near]
+    titles = [*(f"{', '.join(group)}: {label}" for group in far), label]
+    figure, panels = panels_below(titles, [*(0.8 for _ in far), 1.6])
+    styles, hollow = controller_styles(values), {}
+    for axes, group in zip(panels, groups, strict=True):
+        for odd in range(1, len(operators), 2):
+            axes.axvspan(odd - 0.5, odd + 0.5, color=SHADE, zorder=0.0)
+        for place, name in enumerate(group):
+            at = np.arange(len(operators)) + GROUP_WIDTH * ((place + 0.5) / len(group) - 0.5)
+            hollow[name] = np.isin(operators, list((lucky or {}).get(name, ())))
+            for which, is_hollow in ((~hollow[name], False), (hollow[name], True)):
+                bars = deviations[name][which]
+                axes.errorbar(
+                    at[which],
+                    means[name][which],
+                    None if np.isnan(bars).all() else bars,
+                    label=name if which.any() else None,
+                    **styles[name].mark(hollow=is_hollow),
+                )
+        axes.set_xlim(-0.5, len(operators) - 0.5)
+        axes.grid(visible=False, axis="x")
+        axes.tick_params(axis="x", length=0.0, labelbottom=axes is panels[-1])
+    numbers = [operator.removeprefix("table1:") for operator in operators]
+    table = all(number.isdecimal() for number in numbers)
+    ticks, what = (numbers, "manoeuvre of Table I") if table else (operators, "operator")
+    aslant: dict[str, Any] = {"rotation": 30.0, "ha": "right", "rotation_mode": "anchor"}
+    long = len(ticks) * max(map(len, ticks)) > MOST_LETTERS
+    panels[-1].set_xticks(range(len(operators)), ticks, **(aslant if long else {}))
+    panels[-1].set_xlabel(what)
+    if np.any(list(hollow.values())):
+        figure.supxlabel(LUCK, fontsize=FONT_SIZE - 0.5, color=INK)
+    legend_above(figure, panels)
     return figure
 
 
@@ -236,94 +226,89 @@ def learning_figure(
             the same steps in each.
         reference: what the adaptive MPC reaches on the same manoeuvres, by index.
     """
-    figure: Figure = require("matplotlib.figure", extra="results").Figure(
-        figsize=(11.0, 3.4), layout="constrained"
-    )
-    panels = figure.subplots(1, len(LEARNING))
-    for axes, (index, label) in zip(panels, LEARNING.items(), strict=True):
+    figure, panels = panels_below(list(LEARNING.values()), [1.0] * len(LEARNING))
+    styles = controller_styles([*runs, COMPARED_WITH])
+    for axes, index in zip(panels, LEARNING, strict=True):
         for algorithm, curves in runs.items():
             steps = np.array([row["steps"] for row in curves[0]]) / 1e6
             values = np.array([[row[index] for row in curve] for curve in curves])
-            (line,) = axes.plot(
-                steps, np.median(values, axis=0), label=f"{algorithm}, {len(curves)} seed(s)"
-            )
+            seeds = f"{len(curves)} seed" if len(curves) == 1 else f"{len(curves)} seeds"
+            label = f"{algorithm}, {seeds}"
+            axes.plot(steps, np.median(values, axis=0), label=label, **styles[algorithm].line)
             lowest, highest = values.min(axis=0), values.max(axis=0)
-            axes.fill_between(steps, lowest, highest, color=line.get_color(), alpha=0.25)
-        axes.axhline(reference[index], color="black", linestyle="--", label="adaptive MPC")
-        limits = (0.8 * reference[index], LEARNING_CEILING * reference[index])
-        axes.set(xlabel="Environment steps [million]", ylabel=label, ylim=limits)
-        axes.grid(alpha=0.3)
-    panels[0].legend()
+            axes.fill_between(steps, lowest, highest, color=styles[algorithm].colour, alpha=0.25)
+        axes.axhline(reference[index], color=INK, label=f"{COMPARED_WITH} MPC", **BROKEN)
+        axes.set_ylim(0.8 * reference[index], LEARNING_CEILING * reference[index])
+        axes.tick_params(labelbottom=axes is panels[-1])
+    panels[-1].set_xlabel("environment steps [million]")
+    legend_above(figure, panels)
     return figure
 
 
-def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Writes a figure as PNG; the file appears whole or not at all.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
-    with atomic_file(path) as partial:
-        figure.savefig(partial, format="png", dpi=RESOLUTION)
-
-
-def _panels(count: int, height: float, title: str) -> tuple[Figure, Sequence[Axes]]:
-    """A figure of `count` panels below each other, in the style that all figures share."""
-    figure_type = require("matplotlib.figure", extra="results").Figure
-    canvas_type = require("matplotlib.backends.backend_agg", extra="results").FigureCanvasAgg
-    figure = figure_type(figsize=(WIDTH, height), layout="constrained", facecolor="white")
-    canvas_type(figure)
-    panels: Any = figure.subplots(count, 1, sharex=True, sharey=False, squeeze=False)[:, 0]
-    for axes in panels:
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.spines[["left", "bottom"]].set_color(INK)
-        axes.grid(visible=True, color="#e4e4e4", linewidth=0.7)
-        axes.set_axisbelow(True)
-        axes.tick_params(labelsize=FONT_SIZE - 1.0, colors=INK)
-    figure.suptitle(title, x=0.01, ha="left", fontsize=FONT_SIZE + 1.0, color=INK)
-    return figure, panels
-
-
-def _aside(time: float, times: Iterable[float], room: float) -> str:
-    """How to align the label of an instant so that it stays clear of its neighbours'."""
-    gaps = [other - time for other in times]
-    if any(0.0 < gap < room for gap in gaps):
-        return "right"
-    return "left" if any(-room < gap < 0.0 for gap in gaps) else "center"
-
-
-def _name_panel(axes: Axes, name: str, colour: str) -> None:
-    axes.set_title(name, loc="left", fontsize=FONT_SIZE, color=colour, fontweight="bold", pad=3.0)
-
-
-def _finished(
-    figure: Figure, panels: Sequence[Axes], label: str, trajectories: Mapping[str, Trajectory]
-) -> Figure:
-    """The figure with the label that its panels share, the time axis and one legend entry."""
-    figure.supylabel(label, fontsize=FONT_SIZE, color=INK)
-    _over_time(panels[-1], next(iter(trajectories.values())))
-    (first, *_), (name, *_) = panels[0].get_legend_handles_labels()
-    _legend(figure, [first], [name], "outside upper right")
-    return figure
-
-
-def _over_time(axes: Axes, trajectory: Trajectory) -> None:
-    axes.set_xlabel("time [s]", fontsize=FONT_SIZE)
-    end = trajectory.time[-1] + trajectory.parameters.control_period
-    axes.set_xlim(trajectory.time[0], end)
-
-
-def _legend(
-    figure: Figure,
-    handles: Sequence[Any],
-    labels: Sequence[str],
-    place: Literal["outside upper right", "outside lower center"],
-) -> None:
-    figure.legend(
-        handles,
-        labels,
-        loc=place,
-        ncols=min(len(labels), LEGEND_COLUMNS),
-        frameon=False,
-        fontsize=FONT_SIZE - 1.0,
+def _motion_figure(panels: Iterable[Panel], clock: Trajectory, manoeuvre: str) -> Figure:
+    """Draws panels that are not empty; what is enlarged of one at the release is shaded there."""
+    release = release_step(clock.travel_reference)
+    kept = [p for p in panels if p.lines and not (p.at_the_release and release is None)]
+    figure, drawn = panels_below(
+        [p.title for p in kept], [1.0 + 0.3 * p.at_the_release for p in kept]
     )
+    styles = controller_styles(name for panel in kept for name in panel.lines)
+    for axes, panel in zip(drawn, kept, strict=True):
+        for name, line in panel.lines.items():
+            axes.plot(clock.time[: len(line)], line, label=name, **styles[name].line)
+        for name, line in panel.marks.items():
+            axes.plot(clock.time, line, color=INK, ds="steps-post", label=name, **BROKEN)
+    whole = [axes for axes, panel in zip(drawn, kept, strict=True) if not panel.at_the_release]
+    _over_time(whole, clock, manoeuvre)
+    if release is not None:
+        start, end = (clock.time[release] + offset for offset in AROUND_RELEASE)
+        enlarged = [axes for axes, p in zip(drawn, kept, strict=True) if p.lines is kept[-1].lines]
+        enlarged[0].axvspan(start, end, color=SHADE, zorder=0.0)
+        drawn[-1].set_xlim(max(start, clock.time[0]), min(end, clock.time[-1]))
+        drawn[-1].set_xlabel("time [s]")
+    legend_above(figure, drawn)
+    return figure
+
+
+def _differences(lines: Lines) -> list[Panel]:
+    """A panel of the differences of velocities from `COMPARED_WITH`; of large ones the largest."""
+    if COMPARED_WITH not in lines or len(lines) == 1:
+        return []
+    common = min(map(len, lines.values()))
+    origin = lines[COMPARED_WITH][:common]
+    gaps = {name: 1e3 * (line[:common] - origin) for name, line in lines.items()}
+    far, _ = _split({name: gap for name, gap in gaps.items() if name != COMPARED_WITH})
+    largest = "".join(f"; {name}: up to {np.abs(gap).max():.0f}" for name, gap in far.items())
+    near = {name: gap for name, gap in gaps.items() if name not in far}
+    return [Panel(f"difference from {COMPARED_WITH} [mm/s]{largest}", near)]
+
+
+def _split(lines: Lines) -> tuple[Lines, Lines]:
+    """Lines that span far more than is usual, and the others."""
+    spans = {name: float(np.ptp(line)) for name, line in lines.items()}
+    usual = statistics.median_low(spans.values())
+    far = {name: line for name, line in lines.items() if spans[name] > APART * usual}
+    return far, {name: line for name, line in lines.items() if name not in far}
+
+
+def _tiers(means: Mapping[str, NDArray[np.float64]]) -> list[list[str]]:
+    """Controllers in groups, those last whose index is near what is usual for every operator."""
+    table = np.array(list(means.values()))
+    defined = table[:, ~np.isnan(table).any(axis=0)]
+    if not defined.size:
+        return [list(means)]
+    usual = np.quantile(defined, 0.5, axis=0, method="lower")
+    distance = np.abs(defined - usual).max(axis=1)
+    near = [n for n, d in zip(means, distance, strict=True) if d <= APART_MEAN * np.median(usual)]
+    far = {name: mean for name, mean in means.items() if name not in near}
+    return [*_tiers(far), near] if far and near else [list(means)]
+
+
+def _over_time(panels: Sequence[Axes], trajectory: Trajectory, manoeuvre: str) -> None:
+    """Gives panels below each other the whole time of a trajectory as their axis."""
+    for axes in panels:
+        axes.set_xlim(
+            trajectory.time[0], trajectory.time[-1] + trajectory.parameters.control_period
+        )
+        axes.tick_params(labelbottom=axes is panels[-1])
+    panels[-1].set_xlabel(f"time [s], {manoeuvre}")

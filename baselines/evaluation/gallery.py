@@ -6,67 +6,86 @@ others were asked for; Figs. 6 and 7 show all of them.
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Sequence
-from pathlib import Path
+
+import numpy as np
 
 from baselines.evaluation.comparison import index_values
+from baselines.evaluation.drawing import Drawn, Format, draw
 from baselines.evaluation.figures import (
     acceleration_figure,
     index_figure,
     reference_figure,
-    save_figure,
     velocity_figure,
 )
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
+from crane_env import Trajectory
 from crane_env.operators.table1 import TABLE_1
 
+STILL = math.radians(1.0)
+"""A payload that sways more in its last period still swings [rad]."""
 
-def draw_gallery(results: Sequence[EpisodeResult], folder: ResultsFolder) -> list[Path]:
-    """Draws the figures and gives their files; none if no episode finished.
+
+def draw_gallery(
+    results: Sequence[EpisodeResult], folder: ResultsFolder, formats: Sequence[Format]
+) -> Drawn:
+    """Draws the figures, as far as it can; none if no episode finished or no format is given.
 
     Args:
         results: of a comparison whose trajectories were kept.
         folder: where it was kept; the figures go there too.
-
-    Raises:
-        ImportError: matplotlib is missing; the message names the extra.
-        OSError: a file cannot be written.
+        formats: of the files.
     """
     finished = [result for result in results if result.metrics is not None]
-    if not finished:
-        return []
+    if not finished or not formats:
+        return Drawn()
     first = finished[0].spec
-    shown = [
-        result.spec
-        for result in finished
-        if result.spec.operator == first.operator and result.spec.seed == first.seed
-    ]
-    trajectories = {spec.controller: folder.trajectory(spec) for spec in shown}
     name = operator_label(first.operator_name)
+
+    @functools.cache
+    def trajectories() -> dict[str, Trajectory]:
+        shown = (result.spec for result in finished if result.spec.operator == first.operator)
+        return {
+            spec.controller: folder.trajectory(spec) for spec in shown if spec.seed == first.seed
+        }
+
+    iae, drift = (index_values(finished, index) for index in ("IAE", "release_drift"))
     figures = {
-        3: reference_figure(
-            trajectories[first.controller],
-            f"What the operator asks for: {name}",
-            table_1_instants(first.operator_name),
+        3: lambda: reference_figure(
+            trajectories()[first.controller], name, table_1_instants(first.operator_name)
         ),
-        4: velocity_figure(trajectories, f"Payload velocity: {name}"),
-        5: acceleration_figure(trajectories, f"Trolley acceleration: {name}"),
-        6: index_figure(
-            index_values(finished, "IAE"), "IAE [m]", "Integral absolute error of the velocity"
-        ),
-        7: index_figure(
-            index_values(finished, "release_drift"),
-            "release drift [m]",
-            "Position overshoot after the release of the travel button",
-        ),
+        4: lambda: velocity_figure(trajectories(), name),
+        5: lambda: acceleration_figure(trajectories(), name),
+        6: lambda: index_figure(iae, "IAE [m]"),
+        7: lambda: index_figure(drift, "release drift [m]", lucky_drifts(finished)),
     }
-    files = []
-    for number, figure in figures.items():
-        file = folder.figure_file(number)
-        file.parent.mkdir(exist_ok=True)
-        save_figure(figure, file)
-        files.append(file)
-    return files
+    return draw({folder.figures / f"fig{n}": make for n, make in figures.items()}, formats)
+
+
+def lucky_drifts(finished: Sequence[EpisodeResult]) -> dict[str, set[str]]:
+    """Controllers and operators whose payload drifts little only because it was swinging back.
+
+    It still swings at the end, and drifts less than with any controller that stills it.
+    """
+    swinging = {
+        (result.spec.controller, result.spec.operator_name)
+        for result in finished
+        if result.metrics is not None and result.metrics.residual_sway > STILL
+    }
+    drifts = {
+        (controller, operator): float(np.nanmean(drift))
+        for controller, row in index_values(finished, "release_drift").items()
+        for operator, drift in row.items()
+        if not np.isnan(drift).all()
+    }
+    lucky: dict[str, set[str]] = {}
+    for controller, operator in swinging & drifts.keys():
+        still = (drifts[pair] for pair in drifts.keys() - swinging if pair[1] == operator)
+        if drifts[controller, operator] < min(still, default=math.inf):
+            lucky.setdefault(controller, set()).add(operator)
+    return lucky
 
 
 def table_1_instants(operator: str) -> dict[str, float]:
@@ -78,6 +97,6 @@ def table_1_instants(operator: str) -> dict[str, float]:
 
 
 def operator_label(operator: str) -> str:
-    """An operator's name for a title."""
+    """What an operator drives, in words."""
     table, _, number = operator.partition(":")
     return f"manoeuvre {number} of Table I" if table == "table1" else f"operator {operator}"

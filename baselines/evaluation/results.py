@@ -94,9 +94,10 @@ class ResultsFolder:
         """The table of metrics."""
         return self.path / "metrics.parquet"
 
-    def figure_file(self, number: int) -> Path:
-        """Figure by its number in the paper."""
-        return self.path / "figures" / f"fig{number}.png"
+    @property
+    def figures(self) -> Path:
+        """Folder of the drawings."""
+        return self.path / "figures"
 
     def trajectory_file(self, spec: EpisodeSpec) -> Path:
         """Where the trajectory of an episode is."""
@@ -271,7 +272,7 @@ class ResultsFolder:
     def remove_summary(self) -> None:
         """Removes table and figures; the episodes stay."""
         self.metrics_file.unlink(missing_ok=True)
-        for figure in (self.path / "figures").glob("fig*.png"):
+        for figure in self.figures.glob("fig*.*"):
             figure.unlink()
 
     def write_manifest(self, manifest: dict[str, Any]) -> None:

@@ -16,7 +16,7 @@ import dataclasses
 import io
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -242,14 +242,37 @@ def export_file(
 ) -> None:
     """Exports a checkpoint of a training run, or a model that Stable-Baselines3 saved.
 
+    Args:
+        source: a `checkpoint.zip`, or what `model.save` wrote; see `exporter`.
+        target: the .onnx file.
+        algorithm: of a model that is no checkpoint.
+        command: command line, for the card.
+        crane: that a model was trained on; see `exporter`.
+        statistics: what `VecNormalize.save` wrote; see `exporter`.
+
+    Raises:
+        FileNotFoundError, ValueError: as `exporter`; or the graph does not ask for what the model
+            asks for.
+        OSError: the target cannot be written.
+    """
+    exporter(source, algorithm=algorithm, crane=crane, statistics=statistics)(target, command)
+
+
+def exporter(
+    source: Path,
+    *,
+    algorithm: str,
+    crane: CraneParameters | None = None,
+    statistics: Path | None = None,
+) -> Callable[[Path, Sequence[str]], object]:
+    """What exports a model to an .onnx file, given the file and the command line for the card.
+
     Only for files of your own: they hold pickles, and unpickling runs whatever code the file's
     author chose.
 
     Args:
         source: a `checkpoint.zip`, or what `model.save` wrote.
-        target: the .onnx file.
         algorithm: of a model that is no checkpoint.
-        command: command line, for the card.
         crane: that a model was trained on; None: the paper's, if the model's actions are its
             accelerations. A checkpoint knows its own.
         statistics: what `VecNormalize.save` wrote, of a model trained in one.
@@ -258,7 +281,6 @@ def export_file(
         FileNotFoundError: there is no such file.
         ValueError: it is no model, or none for the crane, or a checkpoint of another version; or
             crane or statistics are missing, or given for a checkpoint.
-        OSError: the target cannot be written.
     """
     regular_file("model", source)
     if is_checkpoint(source):
@@ -268,8 +290,10 @@ def export_file(
         if progress.best is None:
             raise ValueError(f"{str(source)!r} has no validated policy yet; train on.")
         model.policy.load_state_dict(progress.best)
-        export_run(model, read_settings(source), progress, target, command=command)
-        return
+        settings = read_settings(source)
+        return lambda target, command: export_run(
+            model, settings, progress, target, command=command
+        )
     choice("algorithm", algorithm, ALGORITHMS)
     try:
         model = algorithm_class(algorithm).load(source, device="cpu")
@@ -284,7 +308,9 @@ def export_file(
         "acceleration_scale": trained.acceleration_scale,
         "parameters": dataclasses.asdict(trained.crane),
     }
-    _write_card(target, export_policy(trained, target), command, card)
+    return lambda target, command: _write_card(
+        target, export_policy(trained, target), command, card
+    )
 
 
 def _write_card(

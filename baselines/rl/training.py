@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -159,6 +159,24 @@ def train(
             env.close()
     model.policy.load_state_dict(recorder.progress.best)
     return model, recorder.progress
+
+
+def check_runs(runs: Mapping[Path, TrainingSettings]) -> None:
+    """Tries what would stop runs at their start: a folder, or the algorithm's hyperparameters.
+
+    Args:
+        runs: folder to settings; they differ by their seeds only.
+
+    Raises:
+        ValueError: a folder has a run of other settings or a checkpoint of another version, or the
+            algorithm does not know its hyperparameters.
+    """
+    for folder, settings in runs.items():
+        if (folder / CHECKPOINT).exists():
+            check_same_run(settings, read_settings(folder / CHECKPOINT), folder)
+    env = new_model(next(iter(runs.values()))).get_env()
+    if env is not None:
+        env.close()
 
 
 def check_same_run(settings: TrainingSettings, kept: TrainingSettings, folder: Path) -> None:

@@ -116,8 +116,9 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     own window, which under X11 needs MUJOCO_GL=glfw.
 
     Args:
-        operator: who presses the buttons: "random", "manoeuvre", "table1:3", "script:FILE", a
-            program, a list of `ButtonEvent`s or an operator object, of which it takes a copy.
+        operator: who presses the buttons: a name such as "random", "manoeuvre" or "table1:3" (see
+            `make_operator`), a program, a list of `ButtonEvent`s or an operator object, of which
+            it takes a copy.
         parameters: `CraneParameters`, a mapping of its fields, or a preset ("paper", "field").
         cost: weights of the stage cost; `StageCost` or a mapping of its fields.
         render_mode: None, "human" (a window) or "rgb_array" (a picture from `render`).

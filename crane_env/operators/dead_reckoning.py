@@ -14,8 +14,8 @@ press that still stops at a distance r ahead of x is then
 
 The trolley's a is the limit of its acceleration, the hoist's is its ramp. That is exact for the
 hoist and for a trolley on which the buttons act directly. An anti-sway controller follows the same
-reference in its own way: in 25 s of random presses the adaptive MPC ends 1 m (paper's crane)
-to 2 m (field) from it, RMS. What the margins do not cover is left to the limit switches.
+reference in its own way: in 25 s of "stress" the adaptive MPC ends 1 m (paper's crane) to 2 m
+(field) from it, RMS. What the margins do not cover is left to the limit switches.
 """
 
 from __future__ import annotations

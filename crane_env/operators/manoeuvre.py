@@ -16,6 +16,9 @@ pass that test. The four times are drawn independently: of their six rank correl
 significant among six. The exponential is cut off at 6 s (0.2 % of it), so that a travel press lasts
 5 s at least. The last event comes before 18.02 s, which leaves 7 s of a 25 s episode to settle.
 
+All of Table I travels forward. Half of these manoeuvres are its mirror image instead, so that no
+policy gains by creeping forward before the button is pressed.
+
 Travel and hoist stay within the crane's limits by dead reckoning (`dead_reckoning.py`): a
 press that would lead past one is shortened.
 """
@@ -62,7 +65,8 @@ class RandomManoeuvre:
         travel_release_max: greatest t3 [s].
         lower_press_min: least t4 [s].
         lower_press_max: greatest t4 [s].
-        backward_probability: share of manoeuvres that travel backward; the paper has none.
+        backward_probability: share of manoeuvres that travel backward, the mirror image of those
+            forward; the paper has none.
         trolley_margin: nominal distance kept from the trolley's limit switches [m].
         hoist_margin: nominal distance kept from the hoist's limit switches [m].
         name: "manoeuvre".
@@ -80,7 +84,7 @@ class RandomManoeuvre:
     travel_release_max: float = 15.296
     lower_press_min: float = 11.139
     lower_press_max: float = 14.011
-    backward_probability: float = 0.0
+    backward_probability: float = 0.5
     trolley_margin: float = 1.0
     hoist_margin: float = 0.1
     name: str = field(init=False, default="manoeuvre")

@@ -10,6 +10,8 @@ from typing import Any
 
 from crane_env.operators.base import ButtonEvent, Operator, Program, ScheduledOperator
 from crane_env.operators.manoeuvre import RandomManoeuvre
+from crane_env.operators.person.operator import PersonOperator
+from crane_env.operators.person.person import PERSONS, Person
 from crane_env.operators.script import ButtonScript, read_script
 from crane_env.operators.semi_markov import RandomButtons
 from crane_env.operators.table1 import TABLE_1, Table1Manoeuvre
@@ -24,9 +26,10 @@ TABLE_1_NUMBERS = [str(number) for number in range(1, len(TABLE_1) + 1)]
 """What may follow "table1:"."""
 
 VALID_NAMES = (
-    f"random, manoeuvre, table1:1 … table1:{len(TABLE_1)}, script:FILE, package.module:factory"
+    f"random, stress, manoeuvre, table1:1 … table1:{len(TABLE_1)}, person:{'|'.join(PERSONS)}, "
+    "script:FILE, package.module:factory"
 )
-FAMILIES = ("random", "manoeuvre", "table1", "script")
+FAMILIES = ("random", "stress", "manoeuvre", "table1", "person", "script")
 """What the names of operators begin with; no module of a factory is looked for under these."""
 
 
@@ -34,8 +37,8 @@ def make_operator(spec: OperatorSpec) -> Operator:
     """Makes an operator.
 
     Args:
-        spec: a name: "random" (see `RandomButtons`), "manoeuvre" (`RandomManoeuvre`), "table1:1" to
-            "table1:10" (`Table1Manoeuvre`), "script:FILE" (`ButtonScript`), or
+        spec: a name: "random" or "stress" (see `RandomButtons`), "manoeuvre" (`RandomManoeuvre`),
+            "table1:1" to "table1:10" (`Table1Manoeuvre`), "script:FILE" (`ButtonScript`), or
             "package.module:factory", a function of your own that takes nothing and returns a
             program or an operator; a mapping of a name and fields of that program, as
             `dataclasses.asdict` makes it; a program; an operator, which is returned as it is; or a
@@ -57,6 +60,8 @@ def make_operator(spec: OperatorSpec) -> Operator:
         given = _program(fields.pop("name"), fields)
     elif isinstance(given, Sequence):
         given = ButtonScript(tuple(given))
+    if isinstance(given, Person):
+        return PersonOperator(given)
     if _presses(given):
         return given  # type: ignore[no-any-return]
     if _is_program(given):
@@ -127,10 +132,14 @@ def _program(name: object, fields: Mapping[str, Any]) -> Any:
     match str(name).partition(":"):
         case "random", "", "":
             program = RandomButtons()
+        case "stress", "", "":
+            program = RandomButtons.stress()
         case "manoeuvre", "", "":
             program = RandomManoeuvre()
         case "table1", ":", number if number in TABLE_1_NUMBERS:
             program = Table1Manoeuvre(int(number))
+        case "person", ":", skill if skill in PERSONS:
+            program = PERSONS[skill]
         case "script", _, _ if "schedule" in fields:  # need not be read any more
             program = ButtonScript((), str(name))
         case "script", ":", file if file:

@@ -15,9 +15,10 @@ A press is long or an inching pulse; the kinds of successive presses are a chain
 pulses come in trains: a pulse follows a long press with `pulse_after_long`, a pulse with
 `pulse_after_pulse`. Dwell times (all independent):
 
-    long press                  log-normal, of `long_median` and `long_spread`
+    long press                  `long_min` plus a log-normal time; its median is `long_median`, and
+                                `long_spread` the standard deviation of the latter's logarithm
     pulse                       uniform, `pulse_min` to `pulse_max`
-    none before a long press    log-normal, of `pause_median` and `pause_spread`
+    none before a long press    likewise, of `pause_min`, `pause_median` and `pause_spread`
     none before a pulse         log-normal, of `pulse_pause_median` and `pulse_pause_spread`
 
 In a direct reversal the thumb slips with `slip_probability`: the new button is down for `slip_min`
@@ -26,21 +27,37 @@ lets neither act (`Buttons`).
 
 The operator knows the rails and the hoist's limits and keeps clear of them by dead reckoning on its
 own presses (`dead_reckoning.py`), ramps and stopping distances included. A press that would
-lead past a limit is shortened; if less than half of it is left, the opposite button is pressed
-instead where that has more room; if neither has room for a pulse, the thumb pauses on.
+lead past a limit is shortened; if less than half of it or than `long_min` is left, the opposite
+button is pressed instead where that has more room; if neither has room, the thumb pauses on.
 
 The operator is open loop on purpose: it does not see what the controller makes of its presses. All
 controllers so face identical buttons under equal seeds, and comparisons between them are paired.
 
-All times are whole control periods, so that presses act exactly as long as reckoned. The numbers
-are assumed.
+All times are whole control periods, so that presses act exactly as long as reckoned.
+
+No logs of crane operators are public, so the numbers are assumed, but within bounds:
+
+- Starts and duty. A hoist or travel motor of group M6 (ISO 4301-1; 3m of FEM 9.511) is chosen for
+  at most 300 starts an hour and 50 % of the time (FEM 9.683; 240 and 40 % in M5, 360 and 60 % in
+  M7). In episodes of 25 s the defaults come to 289 starts an hour and 41 % of the time (travel),
+  276 and 26 % (hoist). Table I's own hoist has 288 and 32 %.
+- The cable. A ramp of the hoist to its speed V in the time t_r leaves the payload bouncing with up
+  to 2 V / t_r, 6.7 m/s^2 on the paper's crane; a start soon after a stop can add up to more than g,
+  and the cable goes slack. The bouncing halves in 1.7 s at the longest cable, so that the
+  defaults hoist for 2 s or longer, pause for 2 s or longer, and neither inch nor reverse the hoist
+  without a pause.
+- No gambling. A long travel press ends with at most 0.4/s at any moment and starts in either
+  direction alike, so that a controller gains little by acting before the buttons do.
+
+`RandomButtons.stress` breaks all three on purpose: about 1,100 starts an hour, trains of pulses and
+reversals on both axes, a slack cable in more than half of its episodes.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,7 +65,7 @@ from crane_env.observation import CraneState
 from crane_env.operators.base import LONGEST_TIME, ButtonEvent, Buttons
 from crane_env.operators.dead_reckoning import Axis, hoist_axis, trolley_axis
 from crane_env.parameters import CraneParameters
-from crane_env.support.checks import not_negative, positive, shown, within
+from crane_env.support.checks import choice, not_negative, positive, shown, within
 from crane_env.support.fields import check_fields
 
 FULL_ROOM_SHARE = 0.5
@@ -68,7 +85,15 @@ PROBABILITIES = (
     "slip_probability",
 )
 POSITIVE = ("long_median", "pause_median", "pulse_pause_median", "pulse_min", "slip_min")
-TIMES = (*POSITIVE, "pulse_max", "slip_max")
+TIMES = (*POSITIVE, "long_min", "pause_min", "pulse_max", "slip_max")
+ORDER = (
+    ("long_min", "long_median"),
+    ("pause_min", "pause_median"),
+    ("pulse_min", "pulse_max"),
+    ("slip_min", "slip_max"),
+)
+"""Times of which the first must not exceed the second."""
+
 SPREADS = ("long_spread", "pause_spread", "pulse_pause_spread")
 
 
@@ -81,12 +106,14 @@ class ButtonHabits:
         same_direction_probability: after a pause, the same button is pressed again.
         pulse_after_long: probability that a pulse follows a long press.
         pulse_after_pulse: probability that a pulse follows a pulse.
+        long_min: shortest long press [s].
         long_median: median long press [s].
-        long_spread: standard deviation of the logarithm of a long press.
+        long_spread: standard deviation of the logarithm of what a long press lasts beyond that.
         pulse_min: shortest pulse [s].
         pulse_max: longest pulse [s].
+        pause_min: shortest pause before a long press [s].
         pause_median: median pause before a long press [s].
-        pause_spread: standard deviation of the logarithm of that pause.
+        pause_spread: standard deviation of the logarithm of what that pause lasts beyond that.
         pulse_pause_median: median pause before a pulse [s].
         pulse_pause_spread: standard deviation of the logarithm of that pause.
         slip_probability: share of direct reversals in which both buttons are pressed for a moment.
@@ -99,17 +126,19 @@ class ButtonHabits:
             `LONGEST_TIME`, or a spread beyond `MAX_SPREAD`.
     """
 
-    direct_reversal_probability: float = 0.12
+    direct_reversal_probability: float = 0.02
     same_direction_probability: float = 0.6
-    pulse_after_long: float = 0.35
-    pulse_after_pulse: float = 0.55
-    long_median: float = 3.0
-    long_spread: float = 0.6
+    pulse_after_long: float = 0.1
+    pulse_after_pulse: float = 0.3
+    long_min: float = 1.0
+    long_median: float = 6.5
+    long_spread: float = 0.5
     pulse_min: float = 0.1
     pulse_max: float = 0.4
-    pause_median: float = 1.5
-    pause_spread: float = 0.7
-    pulse_pause_median: float = 0.6
+    pause_min: float = 1.0
+    pause_median: float = 7.0
+    pause_spread: float = 0.5
+    pulse_pause_median: float = 1.0
     pulse_pause_spread: float = 0.4
     slip_probability: float = 0.1
     slip_min: float = 0.05
@@ -123,14 +152,41 @@ class ButtonHabits:
         check_fields(self, positive, POSITIVE)
         check_fields(self, within, SPREADS, 0.0, MAX_SPREAD)
         check_fields(self, not_negative, ("limit_margin",))
-        for least, greatest in (("pulse_min", "pulse_max"), ("slip_min", "slip_max")):
+        for least, greatest in ORDER:
             low, high = getattr(self, least), getattr(self, greatest)
             if low > high:
                 raise ValueError(f"{greatest} ({high} s) must be at least {least} ({low} s).")
 
 
-HOISTING = ButtonHabits(long_median=2.5, pause_median=2.5, limit_margin=0.1)
-"""Hoisting is used less than travelling and positions more finely."""
+HOISTING = ButtonHabits(
+    direct_reversal_probability=0.0,
+    same_direction_probability=0.4,
+    pulse_after_long=0.0,
+    pulse_after_pulse=0.0,
+    long_min=2.0,
+    long_median=3.5,
+    long_spread=0.6,
+    pause_min=2.0,
+    pause_median=7.5,
+    pause_spread=0.6,
+    limit_margin=0.1,
+)
+"""What was lifted is lowered again, and the cable stays taut."""
+
+STRESS_TRAVELLING = ButtonHabits(
+    direct_reversal_probability=0.12,
+    pulse_after_long=0.35,
+    pulse_after_pulse=0.55,
+    long_min=0.0,
+    long_median=3.0,
+    long_spread=0.6,
+    pause_min=0.0,
+    pause_median=1.5,
+    pause_spread=0.7,
+    pulse_pause_median=0.6,
+)
+STRESS_HOISTING = replace(STRESS_TRAVELLING, long_median=2.5, pause_median=2.5, limit_margin=0.1)
+"""Hardly a motor is made for these, and no cable stays taut."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,18 +196,24 @@ class RandomButtons:
     Attributes:
         travel: habits on the forward and backward buttons.
         hoist: habits on the up and down buttons.
-        name: "random".
+        name: "random", or "stress".
 
     Raises:
-        ValueError: something else in the place of habits.
+        ValueError: something else in the place of habits, or another name.
     """
 
     travel: ButtonHabits = ButtonHabits()
     hoist: ButtonHabits = HOISTING
-    name: str = field(init=False, default="random")
+    name: str = "random"
+
+    @classmethod
+    def stress(cls) -> RandomButtons:
+        """Far more starts than any motor is made for, and than a cable bears; see above."""
+        return cls(travel=STRESS_TRAVELLING, hoist=STRESS_HOISTING, name="stress")
 
     def __post_init__(self) -> None:
         """Refuses what are no habits."""
+        choice("name of random buttons", self.name, ("random", "stress"))
         for thumb in (self.travel, self.hoist):
             if not isinstance(thumb, ButtonHabits):
                 raise ValueError(f"A thumb has ButtonHabits, not {shown(thumb)}.")
@@ -265,7 +327,8 @@ class _Thumb:
         if self._pulse:
             dwell = self._log_normal(habits.pulse_pause_median, habits.pulse_pause_spread)
         else:
-            dwell = self._log_normal(habits.pause_median, habits.pause_spread)
+            beyond = habits.pause_median - habits.pause_min
+            dwell = habits.pause_min + self._log_normal(beyond, habits.pause_spread)
         self._hold(self._steps(dwell), plus=False, minus=False)
 
     def _press(self) -> None:
@@ -273,15 +336,17 @@ class _Thumb:
         if self._pulse:
             dwell = habits.pulse_min + (habits.pulse_max - habits.pulse_min) * self._rng.random()
         else:
-            dwell = self._log_normal(habits.long_median, habits.long_spread)
+            beyond = habits.long_median - habits.long_min
+            dwell = habits.long_min + self._log_normal(beyond, habits.long_spread)
         wanted = self._steps(dwell)
+        least = self._steps(habits.pulse_min if self._pulse else habits.long_min)
         room = self._room(direction)
-        if room < FULL_ROOM_SHARE * wanted:
+        if room < FULL_ROOM_SHARE * wanted or (room < least and not self._pulse):
             opposite = self._room(-direction)
             if opposite > room:
                 direction, room = -direction, opposite
         length = min(wanted, room)
-        if length < self._steps(habits.pulse_min):
+        if length < max(least, self._steps(habits.pulse_min)):
             self._pause()
         else:
             self._direction = direction

@@ -98,6 +98,17 @@ def whole(name: str, value: object, least: int = 0, below: int | None = None) ->
     raise ValueError(f"{name} must be a whole number {allowed}, not {shown(value)}.")
 
 
+def flag(name: str, value: object) -> bool:
+    """True or False.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    raise ValueError(f"{name} must be true or false, not {shown(value)}.")
+
+
 def seed(value: object, name: str = "A seed") -> int:
     """A seed of an episode: a whole number from 0 to before `SEED_LIMIT`.
 

@@ -83,6 +83,24 @@ def test_the_main_job_prints_tables_and_leaves_metrics_trajectories_figures_and_
     assert not list((output / "figures").iterdir())
 
 
+def test_a_figure_that_fails_costs_a_sentence_and_exit_code_1_but_no_table_and_no_other_figure(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("no ink")
+
+    monkeypatch.setattr("baselines.evaluation.gallery.velocity_figure", fail)
+    arguments = (*QUICK, "--operators", "table1:1", "--format", "pdf", "--output", str(tmp_path))
+    assert main(arguments) == 1
+    shown = capfd.readouterr()
+    assert "IAE [m]" in shown.out
+    (said,) = (line for line in shown.err.splitlines() if line.startswith("oilcrane"))
+    assert "fig4' cannot be drawn: RuntimeError: no ink" in said
+    figures = sorted(path.name for path in (tmp_path / "figures").iterdir())
+    assert figures == ["fig3.pdf", "fig5.pdf", "fig6.pdf", "fig7.pdf"]
+    assert ResultsFolder(tmp_path).read_manifest()["status"] == "complete"
+
+
 @pytest.mark.parametrize("interruption", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_keeps_the_finished_episodes_and_the_same_command_goes_on(
     interruption: signal.Signals, tmp_path: Path
@@ -177,8 +195,8 @@ def test_results_are_written_first_wherever_the_tables_go_even_in_ascii(
 BAD_INPUT = {
     "controller": (("--controllers", "nobody"), "Unknown controller 'nobody'; valid: manual, lin"),
     "module": (("--controllers", "nowhere:nobody"), "'nowhere:nobody' cannot be imported"),
-    "operator": (("--operators", "nobody"), "Unknown operator 'nobody'; valid: random, manoeuvre"),
-    "manoeuvre": (("--operators", "table1:11"), "valid: random, manoeuvre, table1:1"),
+    "operator": (("--operators", "nobody"), "Unknown operator 'nobody'; valid: random, stress"),
+    "manoeuvre": (("--operators", "table1:11"), "valid: random, stress, manoeuvre, table1:1"),
     "script": (("--operators", "script:none.csv"), "no button script 'none.csv'"),
     "preset": (("--parameters", "moon"), "must be a preset (paper, field), a JSON object or a fi"),
     "range": (("--parameters", '{"payload_mass": -1}'), "payload_mass must be a positive finite"),

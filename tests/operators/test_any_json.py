@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import CraneState
 from crane_env.operators.manoeuvre import RandomManoeuvre
+from crane_env.operators.person.person import Person
 from crane_env.operators.registry import make_operator
 from crane_env.operators.script import ButtonScript, read_script
 from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
@@ -26,8 +27,18 @@ from crane_env.parameters import CraneParameters
 PAPER = CraneParameters.paper()
 CRANE = gymnasium.make("OILCrane-v0").unwrapped
 START = CraneState(0.0, 0.0, 8.0, 0.0, 0.0, 0.0)
-NAMES = ("random", "manoeuvre", "table1:3", "script", "script:a.csv", "script:a.json")
-DESCRIBED = [f.name for kind in (ButtonHabits, RandomManoeuvre) for f in dataclasses.fields(kind)]
+NAMES = (
+    "random",
+    "manoeuvre",
+    "table1:3",
+    "person:trained",
+    "script",
+    "script:a.csv",
+    "script:a.json",
+)
+DESCRIBED = [
+    f.name for kind in (ButtonHabits, RandomManoeuvre, Person) for f in dataclasses.fields(kind)
+]
 FIELDS = ("name", "time", "buttons", "schedule", "number", "travel", "hoist", *DESCRIBED)
 
 scalars = st.one_of(

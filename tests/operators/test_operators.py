@@ -29,10 +29,14 @@ from tests.operators.nominal_crane import at_rest
 
 PAPER = CraneParameters.paper()
 PRESSED = Buttons(forward=True)
-VALID = "random, manoeuvre, table1:1 … table1:10, script:FILE, package.module:factory"
+VALID = (
+    "random, stress, manoeuvre, table1:1 … table1:10, person:novice|trained|expert, script:FILE, "
+    "package.module:factory"
+)
 
 PROGRAMS = [
     RandomButtons(),
+    RandomButtons.stress(),
     RandomButtons(hoist=ButtonHabits(pause_median=7.0), travel=ButtonHabits(slip_min=0.1)),
     RandomManoeuvre(),
     RandomManoeuvre(backward_probability=0.5, travel_press_max=5.0),
@@ -53,6 +57,7 @@ def program_of(spec: Any) -> Any:
     ("name", "program"),
     [
         ("random", RandomButtons()),
+        ("stress", RandomButtons.stress()),
         ("manoeuvre", RandomManoeuvre()),
         *((f"table1:{number}", Table1Manoeuvre(number)) for number in range(1, 11)),
     ],
@@ -219,7 +224,7 @@ def test_an_unknown_name_lists_the_valid_ones(name: str) -> None:
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ({}, "needs a 'name', one of: random, manoeuvre"),
+        ({}, "needs a 'name', one of: random"),
         ({"name": 3}, "Unknown operator 3; valid: random"),
         ({"name": "random", "speed": 1.0}, "Unknown 'random' field 'speed'; valid: travel, hoist"),
         ({"name": "random", "travel": {"speed": 1.0}}, "Unknown travel field 'speed'"),

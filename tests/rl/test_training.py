@@ -284,10 +284,16 @@ def test_a_folder_with_a_run_of_other_settings_is_refused(
 def test_the_command_line_refuses_bad_input_with_one_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    (tmp_path / "text").touch()
+    kept = ["--output", str(tmp_path), "--steps", "2000", "--environments", "2"]
     for arguments, sentence in (
         (["--algorithm", "magic"], "Unknown algorithm 'magic'; valid: ppo, sac"),
         (["--hyperparameters", "["], "hyperparameters must be a JSON object"),
+        (["--hyperparameters", '{"magic": 1}'], "ppo refuses its hyperparameters"),
+        ([*kept, "--seeds"], "seeds must be at least one"),
+        (["--output", str(tmp_path / "text")], "File exists"),
         (["--export", str(tmp_path / "no.zip")], "There is no model"),
+        (["--export", str(tmp_path / "text")], "is no ppo model of Stable-Baselines3"),
         (["--parameters", "field"], "parameters and statistics belong to --export"),
     ):
         assert main(arguments) == 2

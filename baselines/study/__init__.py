@@ -1,0 +1,1 @@
+"""Study: what controllers are worth to persons who bring payloads to their places."""
