@@ -189,7 +189,7 @@ def play(spec: EpisodeSpec) -> Trajectory:
     try:
         controller = build_controller(spec) if spec.foreign else _controller(spec.controller, setup)
         env = _environment(setup.crane, setup.settings.cost)
-        observation, _ = env.reset(seed=spec.seed, options=options)
+        observation, _ = env.reset(seed=spec.seed)  # whoever the operator is, it starts alike
         controller.act(observation)
         return run_episode(
             env, controller, seed=spec.seed, options=options, max_steps=setup.max_steps

@@ -158,7 +158,7 @@ class ResultsFolder:
             if keep == "trajectories":
                 trajectory.to_parquet(self.trajectory_file(spec))
                 record["trajectory"] = file_digest(self.trajectory_file(spec))
-            write_json(self.record_file(spec), {**record, "checksum": digest(record)})
+            write_json(self.record_file(spec), {**record, "checksum": digest(record)}, indent=None)
         return metrics
 
     def load_episode(self, spec: EpisodeSpec, keep: Keep) -> EpisodeResult | None:
@@ -300,9 +300,9 @@ class ResultsFolder:
         try:
             yield
         except OSError as error:
+            why = os.strerror(error.errno) if error.errno else str(error)  # pyarrow's is a story
             raise OSError(
-                f"The output folder {str(self.path)!r} cannot be written: "
-                f"{error.strerror or error}."
+                f"The output folder {str(self.path)!r} cannot be written: {why}."
             ) from error
 
     def _episode_file(self, spec: EpisodeSpec, ending: str) -> Path:
@@ -311,13 +311,18 @@ class ResultsFolder:
         return self.path / "episodes" / spec.setup.key / f"{readable}_{spec.key}{ending}"
 
 
-def write_json(path: Path, data: Any) -> None:
+def write_json(path: Path, data: Any, indent: int | None = 1) -> None:
     """Writes plain data as JSON; the file appears whole or not at all.
+
+    Args:
+        path: of the file.
+        data: of which it is made.
+        indent: of what is for people to read; None: a line that is written many times as fast.
 
     Raises:
         OSError: the file cannot be written.
     """
-    text = json.dumps(data, indent=1, allow_nan=False)
+    text = json.dumps(data, indent=indent, allow_nan=False)
     with atomic_file(path) as partial:
         partial.write_text(text + "\n", encoding="utf-8")
 

@@ -25,7 +25,7 @@ from typing import Any, NoReturn
 
 import baselines
 import crane_env
-from baselines.evaluation.episode_spec import EpisodeSpec, play
+from baselines.evaluation.episode_spec import EpisodeSpec, Setup, play
 from baselines.evaluation.foreign_code import Reads
 from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
 from crane_env import Trajectory
@@ -170,8 +170,7 @@ def attempt(task: Task) -> tuple[Trajectory, float, str | None] | EpisodeResult:
     def failed(why: str, trace: str = "") -> EpisodeResult:
         return EpisodeResult(task.spec, None, perf_counter() - start, failure=why, traceback=trace)
 
-    # A fresh specification: the key that came with this one is the parent's.
-    spec = dataclasses.replace(task.spec, setup=dataclasses.replace(task.spec.setup))
+    spec = dataclasses.replace(task.spec, setup=own(task.spec.setup))
     try:
         if spec.key != task.key:
             return failed("The code changed while the comparison was running.")
@@ -188,6 +187,12 @@ def attempt(task: Task) -> tuple[Trajectory, float, str | None] | EpisodeResult:
         return failed(f"The simulation diverged after {trajectory.time[-1]:.6g} s.")
     elsewhere = reads().elsewhere(spec.foreign)
     return trajectory, perf_counter() - start, None if elsewhere else read
+
+
+@functools.lru_cache(maxsize=8)
+def own(setup: Setup) -> Setup:
+    """The setup with a key of this process: the one that came with it is the parent's."""
+    return dataclasses.replace(setup)
 
 
 @functools.cache
