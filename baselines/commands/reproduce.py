@@ -81,7 +81,7 @@ class Options:
     """
 
     grid: Grid = "full"
-    manoeuvres: int = 500
+    manoeuvres: int = 300
     timing: bool = True
     output: Path = Path("results/paper")
     report: Path | None = None

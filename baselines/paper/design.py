@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import json
 import multiprocessing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from itertools import pairwise
@@ -30,10 +30,10 @@ from crane_env.support.extras import require
 Grid = Literal["none", "small", "full"]
 """How much is screened."""
 
-WALKS = {"none": 0, "small": 2, "full": 50}
+WALKS = {"none": 0, "small": 2, "full": 40}
 """Number of walks of each grid."""
 
-AGAIN = {"none": (0, 0), "small": (1, 1), "full": (5, 15)}
+AGAIN = {"none": (0, 0), "small": (1, 1), "full": (4, 10)}
 """Best and random readings of each grid that are played again on the MuJoCo crane."""
 
 SEED = 0
@@ -128,13 +128,6 @@ class Screening:
             if any(p == point for p, _ in steps)
         )
 
-    def level_scores(self, point: str) -> dict[Any, list[int]]:
-        """Scores of the walks' readings at each level of a point."""
-        return {
-            value: [o.score for o in self.walked if getattr(o.reading, point) == value]
-            for value in LEVELS[point]
-        }
-
     def best(self, count: int) -> list[Outcome]:
         """Readings that can be played with the highest scores, the paper's own horizons first.
 
@@ -157,6 +150,14 @@ class Screening:
         drawn = [walked[i] for i in rng.permutation(len(walked))[:others]]
         named = [dataclasses.replace(DEFAULT, sway_state=s) for s in LEVELS["sway_state"]]
         return list(dict.fromkeys([*named, *(o.reading for o in self.best(best)), *drawn]))
+
+
+def level_scores(outcomes: Iterable[Outcome], point: str) -> dict[Any, list[int]]:
+    """Scores at each level of a point."""
+    scores: dict[Any, list[int]] = {value: [] for value in LEVELS[point]}
+    for o in outcomes:
+        scores[getattr(o.reading, point)].append(o.score)
+    return {value: found for value, found in scores.items() if found}
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 
 import numpy as np
 
 from baselines.evaluation.tables import markdown_table
 from baselines.paper.checks import percent
 from baselines.paper.claims import CLAIMS
-from baselines.paper.design import CONFIDENCE, MEANS, Screening, Turn
-from baselines.paper.readings import LEVELS, POINTS, level
+from baselines.paper.design import CONFIDENCE, MEANS, Outcome, Screening, Turn, level_scores
+from baselines.paper.readings import POINTS, level
 from baselines.paper.stages import Reproduction
 from baselines.paper.verdicts import COUNTED, OFTEN, failing
 
@@ -30,17 +31,6 @@ def readings_part(reproduction: Reproduction, screening: Screening) -> list[str]
             for number, claim in screened
         )
     )
-    levels = (
-        (
-            POINTS[point],
-            "; ".join(
-                f"{level(point, value)}: {np.mean(scores):.1f}"
-                for value, scores in screening.level_scores(point).items()
-                if scores
-            ),
-        )
-        for point in LEVELS
-    )
     parts = [
         f"{len(screening.outcomes)} readings were screened: Table I on eq. (1) itself, with `ltv` "
         "in the place of `nmpc-b` and `adaptive` in that of `nmpc-a` "
@@ -51,9 +41,15 @@ def readings_part(reproduction: Reproduction, screening: Screening) -> list[str]
         "In how many percent of its changes each point turns each claim (by its number above), "
         f"with Wilson's {percent(CONFIDENCE)} interval; bold from a tenth on:",
         markdown_table(("", *POINTS.values()), turns),
-        f"How many of the {counted} counted claims that can be screened hold on average over the "
-        "walks, by the level of each point:",
-        markdown_table(("point", "claims that hold"), levels),
+        f"How many of the {counted} counted claims that can be screened hold on average, by the "
+        "level of each point; the most in brackets:",
+        markdown_table(
+            ("point", "walks", "the paper's own horizons"),
+            (
+                (name, level_words(screening.walked, point), level_words(screening.own, point))
+                for point, name in POINTS.items()
+            ),
+        ),
     ]
     if reproduction.again:
         parts += _again_part(reproduction, screening)
@@ -118,6 +114,14 @@ def _again_part(reproduction: Reproduction, screening: Screening) -> list[str]:
         "in",
         markdown_table(("claim", "same verdict"), agreeing),
     ]
+
+
+def level_words(outcomes: Iterable[Outcome], point: str) -> str:
+    """Mean and most claims that hold at each level of a point; a dash if it was not varied."""
+    scores = level_scores(outcomes, point)
+    if len(scores) < 2:
+        return "-"
+    return "; ".join(f"{level(point, v)}: {np.mean(n):.1f} ({max(n)})" for v, n in scores.items())
 
 
 def turn_words(turn: Turn | None) -> str:

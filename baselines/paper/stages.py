@@ -29,8 +29,8 @@ from crane_env.operators.table1 import TABLE_1
 PREDICTIVE = ("linear", "adaptive", "nmpc-a", "nmpc-b", "ltv", "tabulated")
 """Controllers that the claims are about."""
 
-CONTROLLERS = ("manual", *PREDICTIVE)
-"""These and the crane without help."""
+CONTROLLERS = ("manual", "linear-measured", *PREDICTIVE)
+"""These, the crane without help, and a fixed length at its best."""
 
 STEADY = ("linear", "adaptive", "nmpc-b")
 """Controllers that also play Table I without hoisting."""

@@ -25,6 +25,7 @@ from baselines.paper.readings import Reading
 
 PAIRS = (
     ("linear", "adaptive"),
+    ("linear-measured", "adaptive"),
     ("nmpc-a", "adaptive"),
     ("nmpc-b", "adaptive"),
     ("nmpc-b", "nmpc-a"),

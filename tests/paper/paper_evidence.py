@@ -19,6 +19,7 @@ COUNT = 10
 LEVELS: Mapping[str, Mapping[str, float]] = {
     "manual": {"IAE": 9.0, "release_drift": 1.0},
     "linear": {"IAE": 4.0, "release_drift": 2.0},
+    "linear-measured": {"IAE": 3.5, "release_drift": 1.8},
     "adaptive": {"IAE": 3.0, "release_drift": 1.5},
     "nmpc-a": {"IAE": 3.003, "release_drift": 1.5015},
     "nmpc-b": {"IAE": 2.95, "release_drift": 1.47},

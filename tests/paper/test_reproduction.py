@@ -1,4 +1,4 @@
-"""Reproduction: its stages, its sensitivity grid, its verdicts and reports, and the script."""
+"""Reproduction: its stages, its verdicts and reports, and the script."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from baselines.paper.evidence import measured_indices, steady_manoeuvre, trackin
 from baselines.paper.readings import DEFAULT, Reading
 from baselines.paper.report import markdown_report, plain_data
 from baselines.paper.stages import (
+    CONTROLLERS,
     Reproduction,
     Stage,
     again_stage,
@@ -62,8 +63,9 @@ def test_a_steady_manoeuvre_presses_the_travel_button_alone_at_its_times() -> No
 
 def test_random_manoeuvres_come_seed_by_seed_so_that_an_interruption_leaves_whole_pairs() -> None:
     specs = repeat_stage(3).specs
-    assert [spec.seed for spec in specs] == [0] * 7 + [1] * 7 + [2] * 7
-    assert specs[:7] == repeat_stage(1).specs
+    each = len(CONTROLLERS)
+    assert [spec.seed for spec in specs] == [0] * each + [1] * each + [2] * each
+    assert specs[:each] == repeat_stage(1).specs
 
 
 def test_what_only_the_linear_mpc_has_makes_no_other_controller_play_again() -> None:

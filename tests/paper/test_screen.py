@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from baselines import make_controller
-from baselines.paper.design import Screening, ScreenTask, keep, outcome, screen
+from baselines.paper.design import Screening, ScreenTask, keep, level_scores, outcome, screen
 from baselines.paper.readings import DEFAULT, Reading, walks
 from baselines.paper.screen import constant_length, law, rides, screened
 from crane_env import CraneParameters, run_episode
@@ -92,7 +92,7 @@ def test_turns_count_the_steps_at_which_a_claim_turns() -> None:
     assert turns["tail"].interval.low < 1.0 == turns["tail"].share
     assert len(screening.outcomes) == len(screening.walked) == 3
     assert screening.best(1)[0].reading == DEFAULT
-    assert len(screening.level_scores("tail")["zero"]) == 2
+    assert {v: len(n) for v, n in level_scores(walk, "tail").items()} == {"hold": 1, "zero": 2}
 
 
 def test_what_was_screened_is_kept_and_not_screened_again(tmp_path: Path) -> None:
