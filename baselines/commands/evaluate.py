@@ -202,6 +202,7 @@ def print_tables(results: Sequence[EpisodeResult]) -> None:
     console = table_console()
     for table in (
         operator_table(results, "IAE", "IAE \\[m]"),
+        operator_table(results, "stage_cost", "Stage cost \\[m²/s]"),
         operator_table(results, "release_drift", "Release drift \\[m]"),
         summary_table(results),
     ):

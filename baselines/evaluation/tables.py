@@ -37,6 +37,7 @@ class Column:
 
 MOTION = (
     Column("IAE", "IAE\n\\[m]", 1.0, 2),
+    Column("stage_cost", "stage\ncost\n\\[m²/s]", 1.0, 2),
     Column("release_drift", "release\ndrift\n\\[m]", 1.0, 2),
     Column("rest_overshoot", "rest over-\nshoot\n\\[m]", 1.0, 2),
     Column("settling_time", "settling\n\\[s]", 1.0, 1),
@@ -59,14 +60,13 @@ UNDEFINED = "-"
 
 def summary_table(results: Sequence[EpisodeResult]) -> Table:
     """One row a controller: what its episodes came to."""
-    table = terminal_table(
-        "Controllers",
-        "Mean ± standard deviation over the episodes (±50 mm band for settling). Act times: median "
-        "over the episodes, by the wall clock, on this machine, as busy as it was.",
-    )
+    table = terminal_table("Controllers", summary_note(results))
     table.add_column("controller")
     table.add_column("episodes", justify="right")
-    for column in (*MOTION, *TIMING):
+    for column in MOTION:
+        table.add_column(column.head, justify="right")
+    table.add_column("slack\ncable", justify="right")
+    for column in TIMING:
         table.add_column(column.head, justify="right")
     for controller in dict.fromkeys(result.spec.controller for result in results):
         own = [result for result in results if result.spec.controller == controller]
@@ -76,9 +76,28 @@ def summary_table(results: Sequence[EpisodeResult]) -> Table:
             controller,
             count,
             *(mean_and_deviation(sample(own, column), column.decimals) for column in MOTION),
+            str(sum(r.metrics is not None and r.metrics.slack_time > 0.0 for r in own)),
             *(median(sample(own, column), column.decimals) for column in TIMING),
         )
     return table
+
+
+def summary_note(results: Iterable[EpisodeResult]) -> str:
+    """What the summary's numbers are of, and of how many episodes the drift is none."""
+    played = [result.metrics for result in results if result.metrics is not None]
+    unreleased = sum(math.isnan(metrics.release_drift) for metrics in played)
+    without = (
+        f" {unreleased} of {len(played)} episodes have no release, as a travel button was pressed "
+        "to the end or none was at all: they have no drift, overshoot or settling time."
+        if unreleased
+        else ""
+    )
+    return (
+        "Mean ± standard deviation over the episodes (±50 mm band for settling); episodes in which "
+        f"the cable went slack.{without} The stage cost is what the controllers minimise: less IAE "
+        "at more of it comes from other weights, not from a better method. Act times: median over "
+        "the episodes, by the wall clock, on this machine, as busy as it was."
+    )
 
 
 def operator_table(results: Sequence[EpisodeResult], index: str, title: str) -> Table:

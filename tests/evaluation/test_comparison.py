@@ -26,7 +26,6 @@ from baselines.evaluation.episode_spec import (
     play,
 )
 from baselines.evaluation.results import PARTIAL_AGE, EpisodeResult, ResultsFolder
-from baselines.evaluation.tables import lowest, mean_and_deviation
 from baselines.evaluation.workers import Task, perform, play_all
 from baselines.mpc.settings import MpcSettings
 from baselines.registry import make_controller
@@ -493,15 +492,3 @@ def test_index_values_keep_controllers_operators_and_seeds_apart(tmp_path: Path)
         found = values[result.spec.controller][result.spec.operator_name][result.spec.seed]
         assert found == metrics_of(result)["max_sway"]
     assert [list(row) for row in values.values()] == [["random", "table1:1"]] * 2
-
-
-def test_the_lowest_value_wins_and_ties_and_gaps_are_fair() -> None:
-    assert lowest({"a": 2.0, "b": 1.0, "c": float("nan")}) == {"b"}
-    assert lowest({"a": 1.0, "b": 1.0}) == {"a", "b"}
-    assert lowest({"a": 1.0, "b": float("nan")}) == set()
-
-
-def test_the_spread_is_the_sample_standard_deviation() -> None:
-    assert mean_and_deviation(np.array([1.0, 2.0, 3.0]), 2) == "2.00 ± 1.00"
-    assert mean_and_deviation(np.array([1.0]), 2) == "1.00"
-    assert mean_and_deviation(np.array([]), 2) == "-"
