@@ -24,6 +24,8 @@ from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
 from crane_env.operators.table1 import Table1Manoeuvre
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
+from crane_env.tasks.registry import make_task
+from crane_env.tasks.task import Goal, Obstacle, Task
 
 EPISODE_STEPS = 1250
 """Control steps of one episode: 25 s at 20 ms; the last event of Table I is at 17.75 s."""
@@ -45,16 +47,20 @@ __all__ = [
     "Controller",
     "CraneParameters",
     "CraneState",
+    "Goal",
     "Metrics",
     "Observation",
+    "Obstacle",
     "Operator",
     "Person",
     "RandomButtons",
     "RandomManoeuvre",
     "StageCost",
     "Table1Manoeuvre",
+    "Task",
     "Trajectory",
     "make_operator",
+    "make_task",
     "practise",
     "read_script",
     "run_episode",

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from crane_env.parameters import CraneParameters
-from crane_env.support.checks import positive, shown
-from crane_env.support.fields import from_fields
+from crane_env.support.checks import positive_range
+from crane_env.support.fields import check_fields, from_fields
 
 Range = tuple[float, float]
 """Lowest and highest value."""
@@ -47,21 +47,7 @@ class Randomisation:
 
     def __post_init__(self) -> None:
         """Brings the ranges into their form, or refuses them."""
-        for field in dataclasses.fields(self):
-            given = getattr(self, field.name)
-            if given is None:
-                continue
-            try:
-                low, high = (positive("Its end", value) for value in given)
-                ordered = low <= high
-            except (TypeError, ValueError):
-                ordered = False
-            if not ordered:
-                raise ValueError(
-                    f"{field.name} must be a range (low, high) of positive numbers in order, "
-                    f"not {shown(given)}."
-                )
-            object.__setattr__(self, field.name, (low, high))
+        check_fields(self, positive_range, self.ranges)
 
     @classmethod
     def of(cls, value: Randomisation | Mapping[str, Any] | None) -> Randomisation:

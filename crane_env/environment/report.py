@@ -42,13 +42,14 @@ def report_start(state: CraneState, cable_tension: Any) -> dict[str, Any]:
     """Info of cranes that have just been placed and have done nothing."""
     nothing, no = 0.0 * cable_tension, cable_tension < 0.0
     still = Outcome(state, cable_tension, nothing, no, no)
-    return _info(still, _payload_velocity(state), nothing, nothing, nothing, no)
+    return _info(still, _payload_velocity(state), nothing, nothing, nothing, no, no)
 
 
 def report_period(
     outcome: Outcome,
     asked: Any,
     travel_reference: Any,
+    success: Any,
     parameters: CraneParameters,
     cost: StageCost,
 ) -> tuple[Any, dict[str, Any]]:
@@ -58,6 +59,7 @@ def report_period(
         outcome: what the plant made of it.
         asked: acceleration that was asked for, before clipping [m/s^2].
         travel_reference: that the controller saw [m/s].
+        success: the task is done.
         parameters: limits and control period.
         cost: the stage cost that the reward is the negative of.
 
@@ -72,7 +74,7 @@ def report_period(
     period = parameters.control_period
     tracking, sway, effort = -period * tracking, -period * sway, -period * effort
     clipped = abs(asked) > (1.0 + ACTION_ROUNDING) * parameters.acceleration_max
-    info = _info(outcome, velocity, tracking, sway, effort, clipped)
+    info = _info(outcome, velocity, tracking, sway, effort, clipped, success)
     return tracking + sway + effort, info
 
 
@@ -82,7 +84,13 @@ def _payload_velocity(state: CraneState) -> Any:
 
 
 def _info(
-    outcome: Outcome, velocity: Any, tracking: Any, sway: Any, effort: Any, clipped: Any
+    outcome: Outcome,
+    velocity: Any,
+    tracking: Any,
+    sway: Any,
+    effort: Any,
+    clipped: Any,
+    success: Any,
 ) -> dict[str, Any]:
     """Info in NumPy's types.
 
@@ -99,6 +107,7 @@ def _info(
         "action_clipped": flag(clipped),
         "drive_limited": flag(limited),
         "simulation_failed": flag(failed),
+        "task_success": flag(success),
         "reward_tracking": number(tracking),
         "reward_sway": number(sway),
         "reward_acceleration": number(effort),

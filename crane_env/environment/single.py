@@ -11,17 +11,25 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from crane_env.environment.options import accelerations, read_options, start_of
+from crane_env.environment.options import (
+    TASK_STREAM,
+    accelerations,
+    read_options,
+    start_of,
+)
 from crane_env.environment.pictures import Pictures
 from crane_env.environment.report import StepRecord, report_period, report_start
 from crane_env.observation import CraneState, Observation, observation_space
-from crane_env.operators.base import RELEASED, Buttons, Operator
+from crane_env.operators.base import EVENT_TOLERANCE, RELEASED, Buttons, Operator, due_time
 from crane_env.operators.registry import OperatorSpec, own_operator
 from crane_env.parameters import CraneParameters
 from crane_env.plant.single import Plant
 from crane_env.stage_cost import StageCost
 from crane_env.support import checks
 from crane_env.support.fixed import fixed
+from crane_env.tasks.judge import TaskJudge
+from crane_env.tasks.registry import TaskSpec, check_task, make_task, task_of_episode
+from crane_env.tasks.task import Task, set_upon
 
 if TYPE_CHECKING:
     from crane_env.rendering.scene import CraneRenderer
@@ -88,18 +96,26 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     | action_clipped      | -      | the action was beyond the limits                   | False    |
     | drive_limited       | -      | speed limit or limit switch overruled the action   | False    |
     | simulation_failed   | -      | the simulation diverged, see below                 | False    |
+    | task_success        | -      | the payload has been brought to the task's goals   | False    |
     | reward_tracking ... | m^2/s  | the three terms of the reward                      | 0        |
 
     ## Starting state
 
     At rest, payload hanging still. `reset(options=...)` may give `cable_length`, `sway_angle`,
-    `sway_rate`, `trolley_position`, `trolley_velocity` and, for that episode, an `operator`.
+    `sway_rate`, `trolley_position`, `trolley_velocity` and, for that episode, an `operator` and a
+    `task`.
+
+    ## Task
+
+    With a task the payload is to be brought to goals, past obstacles (`crane_env.tasks`). It is
+    drawn from the seed, apart from all else: the same seed without a task gives the same presses of
+    an operator who does not look. One with a method `pursue`, as the persons have, is told of it.
 
     ## Episode end
 
-    Never terminates; truncated after 1250 steps (25 s) when made by `gymnasium.make`. Should the
-    simulation ever diverge, the crane stays where it was, the episode is truncated and `info` says
-    `simulation_failed`.
+    Terminates when its task is done, never without a task; truncated after 1250 steps (25 s) when
+    made by `gymnasium.make`. Should the simulation ever diverge, the crane stays where it was, the
+    episode is truncated and `info` says `simulation_failed`.
 
     ## Truth behind wrappers
 
@@ -121,6 +137,8 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
             it takes a copy.
         parameters: `CraneParameters`, a mapping of its fields, or a preset ("paper", "field").
         cost: weights of the stage cost; `StageCost` or a mapping of its fields.
+        task: None, "position", "over-wall", "bay", "sequence", a `Task`, or a mapping; see
+            `make_task`.
         render_mode: None, "human" (a window) or "rgb_array" (a picture from `render`).
         render_width: width of the picture [pixel].
         render_height: height of the picture [pixel].
@@ -140,6 +158,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         operator: OperatorSpec = "random",
         parameters: CraneParameters | Mapping[str, Any] | str | None = None,
         cost: StageCost | Mapping[str, Any] | None = None,
+        task: TaskSpec = None,
         render_mode: str | None = None,
         render_width: int = 960,
         render_height: int = 720,
@@ -157,7 +176,11 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         self.observation_space = observation_space(self._parameters)
         self._default_operator = own_operator(operator)
         self._operator = self._default_operator
+        self._default_task = make_task(task)
+        check_task(self._default_task, self._parameters, self._plant.state())
+        self._judge: TaskJudge | None = None
         self._step_index = 0
+        self._due = -math.inf
         self._press(RELEASED)
         self.recorder: Callable[[StepRecord], None] | None = None
 
@@ -176,6 +199,11 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         """Who presses the buttons in the present episode."""
         return self._operator
 
+    @property
+    def task(self) -> Task | None:
+        """What is to be done in the present episode."""
+        return None if self._judge is None else self._judge.task
+
     def truth(self) -> Observation:
         """State of the plant and the references now in force, whatever wraps the environment."""
         return Observation(*self._plant.state(), *self._references)
@@ -186,28 +214,38 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         """Begins an episode.
 
         Args:
-            seed: seeds the episodes from this one on, from 0 to before 2^63; the operator is part
-                of them.
-            options: any field of `Start` and `operator`, for this episode only.
+            seed: seeds the episodes from this one on, from 0 to before 2^63; operator and task are
+                part of them.
+            options: any field of `Start`, `operator` and `task`, for this episode only.
 
         Raises:
             ValueError: an unknown option, or a value out of range; the crane stays as it was.
         """
-        placed = read_options(options, "operator")
+        placed = read_options(options, "operator", "task")
         operator = self._default_operator
         if "operator" in placed:
             operator = own_operator(placed.pop("operator"))
+        given = self._default_task
+        if "task" in placed:
+            given = make_task(placed.pop("task"))
         start = start_of(placed)
-        start.coordinates(self._parameters)
+        check_task(given, self._parameters, start.coordinates(self._parameters).state)
         super().reset(seed=None if seed is None else checks.seed(seed))
         self._plant.reset(start)
         self._operator = operator
         self._step_index = 0
         state, tension = self._plant.measure()
-        # The operator draws from a generator of its own: how far one episode was played does not
-        # change the next.
-        stream = np.random.default_rng(int(self.np_random.integers(2**63)))
-        self._operator.reset(stream, state, self._parameters)
+        # Operator and task draw from generators of their own: how far one episode was played does
+        # not change the next.
+        number = int(self.np_random.integers(2**63))
+        self._operator.reset(np.random.default_rng(number), state, self._parameters)
+        self._due, self._judge = -math.inf, None
+        if given is not None:
+            stream = np.random.default_rng((number, TASK_STREAM))
+            task = task_of_episode(given, stream, self._parameters, state)
+            assert task is not None, "a task was given"
+            self._judge = TaskJudge(task, self._parameters.control_period)
+            set_upon(self._operator, task, 0)
         self._read_buttons(state)
         info = report_start(state, tension)
         return self._show(state, info, math.nan, 0.0), info
@@ -230,11 +268,16 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         travel_reference, hoist_reference = self._references
         outcome = self._plant.step(min(max(asked, -limit), limit), hoist_reference)
         self._step_index += 1
+        success = False
         if not outcome.failed:
+            if self._judge is not None:
+                success = self._watch(self._judge, outcome.state)
             self._read_buttons(outcome.state)
-        reward, info = report_period(outcome, asked, travel_reference, self._parameters, self._cost)
+        reward, info = report_period(
+            outcome, asked, travel_reference, success, self._parameters, self._cost
+        )
         observation = self._show(outcome.state, info, asked, reward)
-        return observation, reward, False, outcome.failed, info
+        return observation, reward, success, outcome.failed, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draws the crane, the pendant, and reference and payload velocity.
@@ -264,8 +307,20 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         """Everything but the recorder: a copy continues bit for bit and draws for itself."""
         return {**self.__dict__, "recorder": None}
 
+    def _watch(self, judge: TaskJudge, state: CraneState) -> bool:
+        """Whether the task is done; tells the operator if the next goal counts."""
+        if judge.watch(self._step_index, state) and set_upon(
+            self._operator, judge.task, judge.stage
+        ):
+            self._due = -math.inf
+        return judge.success
+
     def _read_buttons(self, state: CraneState) -> None:
-        buttons = self._operator.press(self.time, state)
+        time = self.time
+        if self._due > time + EVENT_TOLERANCE:
+            return
+        buttons = self._operator.press(time, state)
+        self._due = due_time(self._operator)
         if buttons is not self._buttons:
             self._press(Buttons.of(buttons))
 

@@ -14,6 +14,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from crane_env.environment.options import (
+    TASK_STREAM,
     accelerations,
     chosen_by,
     read_options,
@@ -38,6 +39,10 @@ from crane_env.plant.start import AT_REST, Start
 from crane_env.stage_cost import StageCost
 from crane_env.support.checks import choice, whole
 from crane_env.support.fixed import fixed
+from crane_env.tasks.drawn import DrawnTasks
+from crane_env.tasks.judge import TaskJudge, VectorJudge
+from crane_env.tasks.registry import VectorTaskSpec, check_task, make_tasks, task_of_episode
+from crane_env.tasks.task import Task
 
 if TYPE_CHECKING:
     from crane_env.rendering.scene import VectorRenderer
@@ -63,8 +68,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
     As in Gymnasium's `SyncVectorEnv`: the three autoreset modes (an ended crane begins its next
     episode in the step after, in the same step, or when `reset` is called with its bit set in
     `options["reset_mask"]`), `seed` an integer (crane i gets seed + i) or a list. A value among the
-    reset options is for all cranes, or an array of shape (N,); `operator` may be a list or tuple
-    of N descriptions.
+    reset options is for all cranes, or an array of shape (N,); `operator` and `task` may be a list
+    or tuple of N descriptions.
 
     ## Info
 
@@ -74,10 +79,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
 
     ## Episode end
 
-    Truncated after `max_episode_steps`. A crane that is driven until its simulation diverges (a
-    payload thrown over the girder can do that) stays where it was before the step, its episode is
-    truncated too, and `info` says `simulation_failed`. Not terminated: rewards are negative, and a
-    learner would learn to crash. The other cranes do not notice.
+    Terminated when its task is done. Truncated after `max_episode_steps`. A crane that is driven
+    until its simulation diverges (a payload thrown over the girder can do that) stays where it was
+    before the step, its episode is truncated too, and `info` says `simulation_failed`. Not
+    terminated: rewards are negative, and a learner would learn to crash. The other cranes do not
+    notice.
 
     ## Truth behind wrappers
 
@@ -98,6 +104,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         parameters: as for `OILCraneEnv`; or a list or tuple, one for each crane, that differ in
             payload mass, cable stiffness, initial cable length and drive bandwidth only.
         cost: weights of the stage cost; `StageCost` or a mapping of its fields.
+        task: as for `OILCraneEnv`; or a list or tuple of such, one for each crane.
         randomisation: `Randomisation` or a mapping of its fields; None: nothing is randomised.
         max_episode_steps: control steps after which an episode is truncated; None or -1: never.
         autoreset_mode: an `AutoresetMode` or its value: "NextStep", "SameStep", "Disabled".
@@ -123,6 +130,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         operator: VectorOperatorSpec = "random",
         parameters: CraneSpec | Sequence[CraneSpec] = None,
         cost: StageCost | Mapping[str, Any] | None = None,
+        task: VectorTaskSpec = None,
         randomisation: Randomisation | Mapping[str, Any] | None = None,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -156,6 +164,9 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._plant = VectorPlant(self._own_parameters, threads=threads)
         self._default_operators = make_operators(operator, self.num_envs)
         self._operator = VectorOperator(self.num_envs)
+        self._default_tasks = make_tasks(task, self.num_envs)
+        self._check_tasks(self._default_tasks, dict.fromkeys(range(self.num_envs), AT_REST))
+        self._judge = VectorJudge(self.num_envs)
 
         frames = max(1, round(1.0 / self._parameters.control_period))
         self.metadata = {
@@ -188,6 +199,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         return tuple(self._plant.cranes)
 
     @property
+    def tasks(self) -> tuple[Task | None, ...]:
+        """What is to be done by each crane in its present episode."""
+        return tuple(None if judge is None else judge.task for judge in self._judge.judges)
+
+    @property
     def times(self) -> NDArray[np.float64]:
         """Time since the reset of each crane [s], shape (N,)."""
         return np.multiply(self._step_index, self._parameters.control_period, dtype=np.float64)
@@ -202,8 +218,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
 
         Args:
             seed: seeds the episodes from this one on; crane i gets seed + i or entry i of a list.
-            options: any field of `Start`, `operator` and `reset_mask` (bool, shape (N,)), for these
-                episodes only; what concerns cranes out of the mask is ignored.
+            options: any field of `Start`, `operator`, `task` and `reset_mask` (bool, shape (N,)),
+                for these episodes only; what concerns cranes out of the mask is ignored.
 
         Returns:
             Observations, shape (N, 8), and info of the cranes that were reset.
@@ -214,7 +230,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             TypeError: a mask that is no boolean array.
             ResetNeeded: a mask, before all cranes were reset once.
         """
-        placed = read_options(options, "operator", "reset_mask")
+        placed = read_options(options, "operator", "task", "reset_mask")
         chosen = np.ones(self.num_envs, dtype=np.bool_)
         if "reset_mask" in placed:
             chosen = chosen_by(placed.pop("reset_mask"), self.num_envs)
@@ -223,9 +239,14 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         operators = self._default_operators
         if "operator" in placed:
             operators = make_operators(placed.pop("operator"), self.num_envs)
+        tasks = self._default_tasks
+        if "task" in placed:
+            tasks = make_tasks(placed.pop("task"), self.num_envs)
         starts = starts_of_each(placed, chosen, self._parameters)
         seeds = seeds_of_each(seed, self.num_envs)
         indices = np.flatnonzero(chosen)
+        if placed or tasks is not self._default_tasks:
+            self._check_tasks(tasks, dict(zip(indices.tolist(), starts, strict=True)))
         randoms = {
             index: seeding.np_random(seeds[index])
             for index in indices.tolist()
@@ -233,7 +254,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         }
         for index, random in randoms.items():
             self._randoms[index] = random
-        self._begin(indices, operators, starts)
+        self._begin(indices, operators, tasks, starts)
         state, tension = self._plant.measure()
         info = self._complete(report_start(state, tension))
         self._record(state, info, np.full(self.num_envs, np.nan), np.zeros(self.num_envs))
@@ -274,15 +295,20 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         outcome = self._plant.step(np.clip(asked, -limit, limit), hoist_reference, moving)
         self._step_index += moving
         states = np.column_stack(outcome.state)
-        self._operator.press(self.times, states, moving & ~outcome.failed)
+        live = moving & ~outcome.failed
+        for index, judge in self._judge.watch(self._step_index, states, live):
+            self._operator.pursue(index, judge.task, judge.stage)
+        self._operator.press(self.times, states, live)
 
-        reward, info = report_period(outcome, asked, travel_reference, self._parameters, self._cost)
+        terminations = self._judge.success & live
+        reward, info = report_period(
+            outcome, asked, travel_reference, terminations, self._parameters, self._cost
+        )
         rewards = np.where(moving, reward, 0.0)
-        terminations = np.zeros(self.num_envs, dtype=np.bool_)
         truncations = outcome.failed.copy()
         if self.max_episode_steps is not None:
             truncations |= moving & (self._step_index >= self.max_episode_steps)
-        self._ended = truncations.copy()
+        self._ended = terminations | truncations
 
         infos: dict[str, Any] = {}
         beginning = ~moving
@@ -295,7 +321,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         state: Any = outcome.state
         if beginning.any():
             indices = np.flatnonzero(beginning)
-            self._begin(indices, self._default_operators, [AT_REST] * len(indices))
+            starts = [AT_REST] * len(indices)
+            self._begin(indices, self._default_operators, self._default_tasks, starts)
             state, tension = self._plant.measure()
             begun = report_start(state, tension)
             info = {key: np.where(beginning, begun[key], info[key]) for key in begun}
@@ -352,16 +379,17 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self,
         indices: NDArray[np.intp],
         operators: Sequence[Operator],
+        given: Sequence[Task | DrawnTasks | None],
         starts: Sequence[Start],
     ) -> None:
         """Begins an episode of each of some cranes, where its start says."""
-        cranes, streams = [], []
+        cranes, numbers = [], []
         randomised = bool(self._randomisation.ranges)
         for index in indices.tolist():
             # One number an episode, as `OILCraneEnv` draws it; all else is drawn from others that
             # it seeds.
             number = int(self._random(index)[0].integers(2**63))
-            streams.append(np.random.default_rng(number))
+            numbers.append(number)
             crane = self._own_parameters[index]
             if randomised:
                 crane = self._randomisation.draw(np.random.default_rng((number, 1)), crane)
@@ -369,12 +397,41 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._plant.exchange(indices, cranes)
         self._plant.reset(indices, starts)
         states = self._plant.states()
-        for index, crane, stream in zip(indices.tolist(), cranes, streams, strict=True):
+        for index, crane, number in zip(indices.tolist(), cranes, numbers, strict=True):
             start = CraneState(*states[index].tolist())
-            self._operator.reset(index, operators[index], stream, start, crane)
+            task = None
+            if given[index] is not None:
+                stream = np.random.default_rng((number, TASK_STREAM))
+                task = task_of_episode(given[index], stream, crane, start)
+            judge = None if task is None else TaskJudge(task, crane.control_period)
+            self._judge.begin(index, judge)
+            stream = np.random.default_rng(number)
+            self._operator.reset(index, operators[index], stream, start, crane, task)
         self._step_index[indices] = 0
         self._begun[indices] = True
         self._ended[indices] = False
+
+    def _check_tasks(
+        self, given: Sequence[Task | DrawnTasks | None], starts: Mapping[int, Start]
+    ) -> None:
+        """Makes sure that each crane, whichever is drawn, can do its task from its start.
+
+        Raises:
+            ValueError: one cannot; the message says why.
+        """
+        checked = set()
+        for index, start in starts.items():
+            case = given[index], self._own_parameters[index], start
+            if given[index] is None or case in checked:
+                continue
+            checked.add(case)
+            drawn = self._randomisation.check(self._own_parameters[index])
+            # Of what is drawn, tasks depend on the initial length alone.
+            for crane in {one.cable_length_initial: one for one in drawn}.values():
+                try:
+                    check_task(given[index], crane, start.coordinates(crane).state)
+                except ValueError as error:
+                    raise ValueError(f"Environment {index}: {error}") from error
 
     def _complete(self, info: dict[str, Any]) -> dict[str, Any]:
         info["buttons"] = self._operator.buttons.copy()

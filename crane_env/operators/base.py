@@ -105,7 +105,12 @@ def press_events(presses: Iterable[Press]) -> list[ButtonEvent]:
 
 
 class Operator(Protocol):
-    """Whoever holds the pendant."""
+    """Whoever holds the pendant.
+
+    An operator may have an attribute `due`: the time [s] before which `press` would change nothing;
+    it is then not asked before. One that has a method `pursue` is told of the episode's task, see
+    `crane_env.tasks.task.Pursuer`.
+    """
 
     def reset(
         self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters
@@ -121,8 +126,20 @@ class Operator(Protocol):
     def press(self, time: float, state: CraneState) -> Buttons:
         """Buttons pressed during the control period that begins at `time` [s].
 
-        Called once a control step, in order.
+        Called in order, once a control step, but not before `due`.
         """
+
+
+def due_time(operator: Operator) -> float:
+    """Time before which an operator need not be asked [s]; -infinity where it does not say.
+
+    Raises:
+        ValueError: it says something else than a time.
+    """
+    due = getattr(operator, "due", -math.inf)
+    if not isinstance(due, (int, float)) or due != due:
+        raise ValueError(f"When an operator is due must be a time in seconds, not {shown(due)}.")
+    return due
 
 
 class Program(Protocol):

@@ -1,8 +1,7 @@
 """Vector operator: the operators of many cranes, asked only when they have something to say.
 
-An operator that follows a schedule announces its next event (`ScheduledOperator.due`) and is not
-asked before; one that looks at the crane is asked at every control step. What is pressed is kept as
-arrays over the cranes.
+An operator that says when it is `due` is not asked before; any other is asked at every control
+step. What is pressed is kept as arrays over the cranes.
 """
 
 from __future__ import annotations
@@ -14,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crane_env.observation import CraneState
-from crane_env.operators.base import EVENT_TOLERANCE, Buttons, Operator, ScheduledOperator
+from crane_env.operators.base import EVENT_TOLERANCE, Buttons, Operator, due_time
 from crane_env.operators.registry import OperatorSpec, make_operator, own_operator
 from crane_env.parameters import CraneParameters
+from crane_env.tasks.task import Task, set_upon
 
 VectorOperatorSpec = OperatorSpec | Sequence[OperatorSpec]
 """One description for all cranes, or a list or tuple with one for each."""
@@ -76,11 +76,19 @@ class VectorOperator:
         rng: np.random.Generator,
         start: CraneState,
         parameters: CraneParameters,
+        task: Task | None = None,
     ) -> None:
         """Begins an episode of one crane and reads its buttons at time 0; see `Operator.reset`."""
         operator.reset(rng, start, parameters)
         self._operators[index], self._parameters[index] = operator, parameters
+        if task is not None:
+            self.pursue(index, task, 0)
         self._ask(index, operator, 0.0, start)
+
+    def pursue(self, index: int, task: Task, stage: int) -> None:
+        """Tells one operator which goal counts, and has it asked next time; see `Pursuer`."""
+        if set_upon(self._operators[index], task, stage):
+            self._due[index] = -np.inf
 
     def press(
         self, times: NDArray[np.float64], states: NDArray[np.float64], live: NDArray[np.bool_]
@@ -104,4 +112,4 @@ class VectorOperator:
         parameters = self._parameters[index]
         assert parameters is not None, "an operator operates a crane"
         self.references[index] = buttons.references(parameters)
-        self._due[index] = operator.due if isinstance(operator, ScheduledOperator) else -np.inf
+        self._due[index] = due_time(operator)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
 from crane_env.support.checks import within
 
@@ -20,6 +21,15 @@ class Coordinates(NamedTuple):
 
     position: tuple[float, float, float, float, float]
     velocity: tuple[float, float, float, float, float]
+
+    @property
+    def state(self) -> CraneState:
+        """Motion of trolley, cable and payload."""
+        setpoint, error, sway, reach, _ = self.position
+        setpoint_rate, error_rate, sway_rate, reach_rate, _ = self.velocity
+        return CraneState(
+            setpoint + error, setpoint_rate + error_rate, reach, reach_rate, sway, sway_rate
+        )
 
 
 class Start(NamedTuple):

@@ -78,6 +78,24 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
     return _where(name, value, allowed, lambda number: low <= number <= high)
 
 
+def positive_range(name: str, value: object) -> tuple[float, float]:
+    """A lowest and a highest value, both positive.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    try:
+        low, high = (positive("Its end", end) for end in value)  # type: ignore[attr-defined]
+        ordered = low <= high
+    except (TypeError, ValueError):
+        ordered = False
+    if not ordered:
+        raise ValueError(
+            f"{name} must be a range (low, high) of positive numbers in order, not {shown(value)}."
+        )
+    return low, high
+
+
 def whole(name: str, value: object, least: int = 0, below: int | None = None) -> int:
     """A whole number.
 

@@ -5,12 +5,25 @@ d = l cos(theta) below it. A goal is reached when, for `hold` seconds on end,
 
     |x_p - position| <= tolerance,   |y| <= speed_limit,   and, where a depth is asked for,
     |d - depth| <= tolerance.
+
+The payload is a point, as in the plant's equations: an obstacle is as wide and as high as what that
+point must not enter. A real wall is narrower by the payload's width and lower by its height, and so
+it is drawn.
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+from crane_env.kinematics import payload_position
+from crane_env.observation import CraneState
+from crane_env.parameters import CraneParameters
+from crane_env.support.arithmetic import cosine
+from crane_env.support.checks import choice, not_negative, positive, real, shown
+from crane_env.support.fields import check_fields
 
 POSITION_TOLERANCE = 0.05
 """Half width of a goal [m]: +-50 mm, from a tender's acceptance text."""
@@ -20,6 +33,8 @@ SPEED_LIMIT = 0.05
 
 HOLD_TIME = 2.0
 """How long the payload is to stand at a goal [s]; assumed."""
+
+Part = TypeVar("Part", "Goal", "Obstacle")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +47,9 @@ class Goal:
         tolerance: largest distance from position and depth [m].
         speed_limit: largest payload speed along the girder [m/s].
         hold: how long it is to stay within both [s].
+
+    Raises:
+        ValueError: a value out of range; the message says what is allowed.
     """
 
     position: float
@@ -39,6 +57,14 @@ class Goal:
     tolerance: float = POSITION_TOLERANCE
     speed_limit: float = SPEED_LIMIT
     hold: float = HOLD_TIME
+
+    def __post_init__(self) -> None:
+        """Refuses what is no place."""
+        check_fields(self, real, ("position",))
+        check_fields(self, positive, ("tolerance", "speed_limit"))
+        check_fields(self, not_negative, ("hold",))
+        if self.depth is not None:
+            check_fields(self, positive, ("depth",))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,19 +75,136 @@ class Obstacle:
         left: its left side along the girder [m].
         right: its right side along the girder [m].
         top: depth of its upper edge below the girder [m]; it fills all that is deeper.
+
+    Raises:
+        ValueError: a value out of range; the message says what is allowed.
     """
 
     left: float
     right: float
     top: float
 
+    def __post_init__(self) -> None:
+        """Refuses what cannot stand."""
+        check_fields(self, real, ("left", "right"))
+        check_fields(self, positive, ("top",))
+        if not self.left < self.right:
+            raise ValueError(
+                f"An obstacle's left side ({self.left:g} m) must be left of its right side "
+                f"({self.right:g} m)."
+            )
+
+    def holds(self, place: Place) -> bool:
+        """Whether a place lies within it."""
+        return self.left < place.position < self.right and place.depth > self.top
+
+    def __str__(self) -> str:
+        """Where it stands, for messages."""
+        return f"the obstacle from {self.left:g} to {self.right:g} m, {self.top:g} m below"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """Goals in their order, and the obstacles that stand for the whole of the episode."""
+    """Goals in their order, and the obstacles that stand for the whole of the episode.
+
+    Attributes:
+        goals: one or more, or mappings of their fields.
+        obstacles: any number, or mappings of their fields.
+
+    Raises:
+        ValueError: no goal, or something that is none.
+    """
 
     goals: tuple[Goal, ...]
     obstacles: tuple[Obstacle, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Brings goals and obstacles into their form, or refuses them."""
+        object.__setattr__(self, "goals", _parts(Goal, "goals", self.goals))
+        object.__setattr__(self, "obstacles", _parts(Obstacle, "obstacles", self.obstacles))
+        if not self.goals:
+            raise ValueError("A task needs at least one goal.")
+
+    def check(self, parameters: CraneParameters, start: CraneState) -> None:
+        """Makes sure that a crane can do it.
+
+        Args:
+            parameters: the crane.
+            start: where it begins.
+
+        Raises:
+            ValueError: a goal out of reach or within an obstacle, an obstacle over the start, or
+                one that the payload cannot be lifted over on its way.
+        """
+        p, limit = parameters, parameters.trolley_position_limit
+        begin = place_of(start)
+        for obstacle in self.obstacles:
+            if obstacle.holds(begin):
+                raise ValueError(
+                    f"The payload starts at {begin.position:g} m, {begin.depth:g} m below the "
+                    f"girder, within {obstacle}."
+                )
+        for number, goal in enumerate(self.goals):
+            if abs(goal.position) > limit:
+                raise ValueError(
+                    f"Goal {number} at {goal.position:g} m is out of reach: the trolley travels "
+                    f"from {-limit:g} to {limit:g} m."
+                )
+            if goal.depth is None:
+                continue
+            if not p.cable_length_min <= goal.depth <= p.cable_length_max:
+                raise ValueError(
+                    f"Goal {number} {goal.depth:g} m below the girder is out of reach: the hoist "
+                    f"goes from {p.cable_length_min:g} to {p.cable_length_max:g} m."
+                )
+            for obstacle in self.obstacles:
+                if obstacle.holds(Place(goal.position, goal.depth)):
+                    raise ValueError(f"Goal {number} lies within {obstacle}.")
+        way = [begin.position, *(goal.position for goal in self.goals)]
+        for number, ends in enumerate(itertools.pairwise(way)):
+            for obstacle in self.obstacles:
+                passed = obstacle.left < max(ends) and min(ends) < obstacle.right
+                if passed and obstacle.top <= p.cable_length_min:
+                    raise ValueError(
+                        f"Goal {number} is out of reach: the payload can be lifted to "
+                        f"{p.cable_length_min:g} m below the girder, not over {obstacle}."
+                    )
+
+
+class Place(NamedTuple):
+    """Where a payload hangs: along the girder and below it [m]."""
+
+    position: float
+    depth: float
+
+
+def place_of(state: CraneState) -> Place:
+    """Where the payload of a crane hangs."""
+    s, length, sway = state.trolley_position, state.cable_length, state.sway_angle
+    return Place(payload_position(s, length, sway), length * cosine(sway))
+
+
+def _parts(kind: type[Part], name: str, given: Any) -> tuple[Part, ...]:
+    """Goals or obstacles of themselves or of mappings of their fields."""
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise ValueError(f"The {name} of a task must be a sequence, not {shown(given)}.")
+    return tuple(_part(kind, one) for one in given)
+
+
+def _part(kind: type[Part], given: Any) -> Part:
+    name = kind.__name__
+    if isinstance(given, kind):
+        return given
+    if not isinstance(given, Mapping):
+        raise ValueError(f"A task's {name} must be one or a mapping, not {shown(given)}.")
+    for field in given:
+        choice(f"{name} field", field, kind.__dataclass_fields__)
+    try:
+        return kind(**given)
+    except TypeError as error:
+        raise ValueError(
+            f"A task's {name} needs its fields {', '.join(kind.__dataclass_fields__)}."
+        ) from error
 
 
 class Pursuer(Protocol):
@@ -73,3 +216,11 @@ class Pursuer(Protocol):
         The environment calls it right after the operator's `reset` and before its first `press`,
         and again in the control step in which a goal was reached and the next one counts.
         """
+
+
+def set_upon(operator: object, task: Task, stage: int) -> bool:
+    """Tells an operator which goal counts, if it is a `Pursuer`; returns whether it is."""
+    pursue = getattr(operator, "pursue", None)
+    if pursue is not None:
+        pursue(task, stage)
+    return pursue is not None

@@ -19,7 +19,16 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
-from crane_env import ButtonEvent, Buttons, CraneParameters, Observation, StageCost
+from crane_env import (
+    ButtonEvent,
+    Buttons,
+    CraneParameters,
+    Goal,
+    Observation,
+    Obstacle,
+    StageCost,
+    Task,
+)
 from crane_env.environment.single import OILCraneEnv
 from crane_env.operators.base import ScheduledOperator
 from crane_env.operators.manoeuvre import RandomManoeuvre
@@ -305,6 +314,7 @@ ARGUMENTS: dict[str, Any] = {
     "operator": RandomManoeuvre(),
     "parameters": CraneParameters(payload_mass=150.0),
     "cost": StageCost(sway_weight=2.0),
+    "task": Task(goals=(Goal(position=3.0),), obstacles=(Obstacle(left=4.0, right=5.0, top=6.0),)),
     "render_mode": "rgb_array",
     "render_width": 640,
     "render_height": 500,
@@ -318,6 +328,7 @@ def arguments_of(env: OILCraneEnv) -> dict[str, Any]:
         "operator": operator.program,
         "parameters": env.parameters,
         "cost": env.cost,
+        "task": env._default_task,
         "render_mode": env.render_mode,
         "render_width": env._pictures.size[0],
         "render_height": env._pictures.size[1],
@@ -340,6 +351,7 @@ def test_mappings_of_json_are_arguments_too() -> None:
     env = make(
         parameters=json.loads(json.dumps(dataclasses.asdict(ARGUMENTS["parameters"]))),
         cost={"sway_weight": 2.0},
+        task=json.loads(json.dumps(dataclasses.asdict(ARGUMENTS["task"]))),
         operator=json.loads(json.dumps(dataclasses.asdict(ARGUMENTS["operator"]))),
         render_mode="rgb_array",
         render_width=640,
@@ -355,6 +367,7 @@ def test_mappings_of_json_are_arguments_too() -> None:
         ({"parameters": {"payload_mass": -5.0}}, "payload_mass must be a positive"),
         ({"cost": {"sway_weight": -5.0}}, "sway_weight must be zero or a positive"),
         ({"render_mode": "ascii"}, "Unknown render_mode 'ascii'; valid: human, rgb_array"),
+        ({"task": "stacking"}, "Unknown task 'stacking'; valid: position, over-wall, bay, seq"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:.*render_mode.*")
