@@ -56,7 +56,7 @@ class DrawnTasks(abc.ABC):
 
     ranges: ClassVar[Sequence[str]]
 
-    name: str
+    name: str = ""
     tolerance: float = POSITION_TOLERANCE
     speed_limit: float = SPEED_LIMIT
     hold: float = HOLD_TIME
