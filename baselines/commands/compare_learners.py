@@ -30,14 +30,13 @@ from baselines.commands.terminal import (
     progress,
     run,
 )
-from baselines.evaluation.comparison import check_controllers, compare
+from baselines.evaluation.comparison import check_controllers, compare, make_ready
 from baselines.evaluation.drawing import draw
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.figures import learning_figure
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.statistics import paired_difference
 from baselines.evaluation.tables import markdown_table
-from baselines.evaluation.workers import processes
 from baselines.rl.onnx_policy import table1_means
 from baselines.rl.validation import VALIDATION, VALIDATION_SEEDS, drive
 from crane_env import CraneParameters
@@ -139,25 +138,24 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
         raise ValueError(f"controllers must include {REFERENCE!r}, the reference.")
     if min(options.manoeuvres, options.shifted_manoeuvres) < 2:
         raise ValueError("manoeuvres and shifted_manoeuvres must be at least 2.")
-    processes(options.jobs)
     runs = trained_runs(options.runs)
     if runs:
         require("matplotlib.figure", extra="results")
     check_controllers(episode_specs(options.controllers, ["manoeuvre"], [0], Setup()))
-    ResultsFolder(options.output).prepare()
+    folder = ResultsFolder(options.output)
+    play = functools.partial(play_behind_bar, folder, make_ready(folder, options.jobs), command)
     options.report.parent.mkdir(parents=True, exist_ok=True)
     check_writable("report", options.report)
-    return functools.partial(compare_learners, options, runs, command)
+    return functools.partial(compare_learners, options, runs, play)
 
 
-def compare_learners(options: Options, runs: Sequence[Run], command: Sequence[str]) -> None:
+def compare_learners(options: Options, runs: Sequence[Run], play: Play) -> None:
     """Plays everything and writes the report.
 
     Raises:
         FailedError: an episode or the figure failed.
         KeyboardInterrupt: interrupted; with where the finished episodes are.
     """
-    play = functools.partial(play_behind_bar, options, command)
     try:
         sections = [
             *training_section(runs),
@@ -372,7 +370,11 @@ def shift_section(options: Options, play: Play) -> list[str]:
 
 
 def play_behind_bar(
-    options: Options, command: Sequence[str], specs: Sequence[EpisodeSpec], title: str
+    folder: ResultsFolder,
+    jobs: int,
+    command: Sequence[str],
+    specs: Sequence[EpisodeSpec],
+    title: str,
 ) -> list[EpisodeResult]:
     """Plays episodes behind a progress bar; their metrics are kept.
 
@@ -382,8 +384,8 @@ def play_behind_bar(
     with progress(title, len(specs)) as advance:
         results = compare(
             specs,
-            ResultsFolder(options.output),
-            jobs=processes(options.jobs),
+            folder,
+            jobs=jobs,
             keep="metrics",
             command=command,
             on_result=advance,

@@ -7,6 +7,7 @@ oilcrane evaluate --controllers linear adaptive --operators random --seeds 0:100
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,13 +22,12 @@ from baselines.commands.terminal import (
     run,
     table_console,
 )
-from baselines.evaluation.comparison import check_controllers, compare
+from baselines.evaluation.comparison import check_controllers, compare, make_ready
 from baselines.evaluation.drawing import Drawn, Format
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.gallery import draw_gallery
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.tables import operator_table, summary_table
-from baselines.evaluation.workers import processes
 from baselines.mpc.settings import MpcSettings
 from crane_env import CraneParameters
 from crane_env.operators.table1 import TABLE_1
@@ -35,9 +35,6 @@ from crane_env.parameters import PRESETS
 from crane_env.support.extras import require
 
 PROGRAM = "oilcrane evaluate"
-
-MOST_SEEDS = 100_000
-"""More take longer than anybody waits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +91,6 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
         ImportError: a package is missing; the message names the extra that brings it.
         OSError: a file that cannot be read, or a folder that cannot be written.
     """
-    jobs = processes(options.jobs)
     setup = Setup(
         crane=crane_parameters(options.parameters, "parameters"),
         nominal=None if options.nominal is None else crane_parameters(options.nominal, "nominal"),
@@ -102,12 +98,13 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
         max_steps=options.max_steps,
     )
     operators = [name for given in options.operators for name in operator_names(given)]
-    specs = episode_specs(options.controllers, operators, all_seeds(options.seeds), setup)
+    seeds = itertools.chain.from_iterable(map(seed_range, options.seeds))
+    specs = episode_specs(options.controllers, operators, seeds, setup)
     if options.figures:
         require("matplotlib.figure", extra="results")
     check_controllers(specs)
     folder = ResultsFolder(options.output)
-    folder.prepare()
+    jobs = make_ready(folder, options.jobs)
     formats = options.format if options.figures else ()
     return functools.partial(evaluate, specs, folder, jobs, command, formats)
 
@@ -170,18 +167,6 @@ def json_object(given: str, must_be: str) -> dict[str, Any]:
 def operator_names(given: str) -> list[str]:
     """All manoeuvres of Table I for the name of the table, else the name itself."""
     return [f"table1:{n}" for n in range(1, len(TABLE_1) + 1)] if given == "table1" else [given]
-
-
-def all_seeds(given: Sequence[str]) -> list[int]:
-    """Seeds of numbers and of ranges FIRST:END.
-
-    Raises:
-        ValueError: one is neither, or there are more than `MOST_SEEDS`.
-    """
-    ranges = [seed_range(word) for word in given]
-    if sum(max(0, seeds.stop - seeds.start) for seeds in ranges) > MOST_SEEDS:
-        raise ValueError(f"seeds must be at most {MOST_SEEDS}, not as many as {' '.join(given)}.")
-    return [seed for seeds in ranges for seed in seeds]
 
 
 def seed_range(given: str) -> range:

@@ -22,11 +22,10 @@ from baselines.commands.terminal import (
     run,
     table_console,
 )
-from baselines.evaluation.comparison import check_controllers
+from baselines.evaluation.comparison import check_controllers, make_ready
 from baselines.evaluation.drawing import Format
 from baselines.evaluation.gallery import draw_gallery
 from baselines.evaluation.results import EpisodeResult, write_json
-from baselines.evaluation.workers import processes
 from baselines.paper.checks import PAPER_MPCS
 from baselines.paper.design import Grid, Screening, screen, screen_tasks
 from baselines.paper.evidence import measured_indices
@@ -102,7 +101,6 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
         ImportError: a package is missing; the message names the extra that brings it.
         OSError: a file or folder that cannot be written.
     """
-    jobs = processes(options.jobs)
     if options.manoeuvres < 0 or options.manoeuvres == 1:
         raise ValueError(
             "manoeuvres must be 0 or at least 2, of which an interval can be formed, not "
@@ -111,7 +109,7 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     require("matplotlib.figure", extra="results")
     stages = [defaults_stage(), *([timing_stage()] if options.timing else [])]
     for stage in stages:
-        stage_folder(stage, options.output).prepare()
+        jobs = make_ready(stage_folder(stage, options.output), options.jobs)
     check_writable("report", report_file(options))
     for stage in stages:
         check_controllers(stage.specs)

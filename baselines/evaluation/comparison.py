@@ -48,11 +48,24 @@ def check_controllers(specs: Sequence[EpisodeSpec]) -> None:
         raise raised[0]
 
 
+def make_ready(folder: ResultsFolder, jobs: int | None) -> int:
+    """Makes a folder ready for a comparison and gives the number of its processes.
+
+    `compare` does so itself; who calls it before learns at once what is wrong.
+
+    Raises:
+        ValueError, ImportError, OSError: as `processes` and `ResultsFolder.prepare`.
+    """
+    number = processes(jobs)
+    folder.prepare()
+    return number
+
+
 def compare(
     specs: Sequence[EpisodeSpec],
     folder: ResultsFolder,
     *,
-    jobs: int,
+    jobs: int | None,
     keep: Keep = "trajectories",
     command: Sequence[str] = (),
     on_result: Callable[[EpisodeResult], None] = lambda _: None,
@@ -65,7 +78,7 @@ def compare(
     Args:
         specs: the episodes, no two alike.
         folder: where they are kept.
-        jobs: number of processes.
+        jobs: number of processes; None is one a core.
         keep: what is kept of each episode.
         command: command line, for the manifest.
         on_result: called with every result as it comes, reused ones first.
@@ -78,8 +91,7 @@ def compare(
         OSError: the folder cannot be written, was deleted meanwhile, or another run writes to it;
             what finished is kept.
     """
-    jobs = processes(jobs)
-    folder.prepare()
+    jobs = make_ready(folder, jobs)
     foreign_code.forget()
     with folder.locked():
         return _compare(specs, folder, jobs, keep, command, on_result)
