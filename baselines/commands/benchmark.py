@@ -31,7 +31,14 @@ from rich.table import Table
 
 import crane_env
 from baselines import make_controller
-from baselines.commands.terminal import Job, check_writable, run, table_console
+from baselines.commands.terminal import (
+    FailedError,
+    Job,
+    check_writable,
+    failure_lines,
+    run,
+    table_console,
+)
 from baselines.evaluation.comparison import compare
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.results import ResultsFolder, write_json
@@ -354,16 +361,22 @@ def benchmark_evaluate(rounds: int) -> list[Timing]:
 
 
 def evaluation_times(specs: Sequence[EpisodeSpec], jobs: int) -> tuple[float, float]:
-    """Processor time of an evaluation, and time between two episodes when all workers run [s]."""
+    """Processor time of an evaluation, and time between two episodes when all workers run [s].
+
+    Raises:
+        FailedError: an episode failed, as all do when the code is edited meanwhile.
+    """
     ends: list[float] = []
     before = processor_time()
     with tempfile.TemporaryDirectory() as folder:
-        compare(
+        results = compare(
             specs,
             ResultsFolder(Path(folder)),
             jobs=jobs,
             on_result=lambda _: ends.append(perf_counter()),
         )
+    if failures := failure_lines(results):
+        raise FailedError(*failures)
     steady = ends[FEW // 2 :]
     return processor_time() - before, (steady[-1] - steady[0]) / (len(steady) - 1)
 
