@@ -157,7 +157,7 @@ def episode_specs(
     names = list(dict.fromkeys(controllers))
     programs = [operator_program(name) for name in dict.fromkeys(operators)]
     # A range of seeds may be longer than there is memory.
-    some = list(map(checks.seed, itertools.islice(seeds, MOST_EPISODES + 1)))
+    some = list(itertools.islice(seeds, MOST_EPISODES + 1))
     if len(names) * len(programs) * len(some) > MOST_EPISODES:
         raise ValueError(
             f"There may be at most {MOST_EPISODES} episodes: ask for fewer seeds, operators or "
@@ -167,7 +167,7 @@ def episode_specs(
         EpisodeSpec(controller=name, operator=program, seed=seed, setup=setup)
         for name in names
         for program in programs
-        for seed in dict.fromkeys(some)
+        for seed in dict.fromkeys(map(checks.seed, some))
     ]
     if not specs:
         raise ValueError("There is nothing to play: name a controller, an operator and a seed.")
