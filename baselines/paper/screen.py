@@ -25,9 +25,10 @@ from baselines.evaluation.episode_spec import Setup
 from baselines.mpc.limits import TrolleyLimits
 from baselines.mpc.linear import condense
 from baselines.mpc.prediction.constant_length import PendulumPrediction
-from baselines.mpc.prediction.sway_model import SwayModel
+from baselines.mpc.prediction.sway_model import SwayModel, Turn
 from baselines.mpc.prediction.varying_length import TimeVaryingPrediction
 from baselines.mpc.quadratic_program import QuadraticProgram
+from baselines.mpc.settings import SwayState
 from baselines.paper.evidence import Evidence, tracking
 from baselines.paper.readings import Reading
 from baselines.paper.ride import Eyes, Limits, compiled_ride
@@ -149,30 +150,35 @@ class Driver(NamedTuple):
 
     Attributes:
         law: its moves along the rides.
-        sway_model: where it has its sway from.
+        turn: of its sway model.
+        eyes: what it starts from.
     """
 
     law: Law
-    sway_model: SwayModel
+    turn: Turn
+    eyes: Eyes
+
+    @classmethod
+    def of(cls, own: Law, reading: Reading, state: SwayState) -> Driver:
+        """The driver that has its sway from there."""
+        turn = SwayModel(reading.setup.crane, reading.setup.settings, state).turn
+        eyes = Eyes(state != "measured", state == "corrected", reading.fixed_length)
+        return cls(own, turn, eyes)
 
 
 @functools.lru_cache(maxsize=1)
 def shared_indices(shared: Reading) -> tuple[Rides, dict[str, Array], dict[str, Array]]:
     """Rides, and indices of `adaptive` and `ltv`: the same for all MPCs of fixed length."""
-    setup = shared.setup
-    ridden = rides(setup.crane)
-    sensor = SwayModel(setup.crane, setup.settings, "measured")
-    still, eyes = np.zeros_like(ridden.rate), Eyes(False, False, shared.fixed_length)
-    laws = (
-        law(constant_length(setup), shared, ridden.length, still),
-        law(
-            TimeVaryingPrediction(setup.crane, setup.settings).residuals,
-            shared,
-            ridden.length,
-            ridden.rate,
-        ),
+    ridden = rides(shared.setup.crane)
+    varying = TimeVaryingPrediction(shared.setup.crane, shared.setup.settings)
+    still = np.zeros_like(ridden.rate)
+    adaptive, ltv = (
+        found(shared, ridden, Driver.of(own, shared, "measured"))
+        for own in (
+            law(constant_length(shared.setup), shared, ridden.length, still),
+            law(varying.residuals, shared, ridden.length, ridden.rate),
+        )
     )
-    adaptive, ltv = (found(shared, ridden, Driver(own, sensor), eyes) for own in laws)
     return ridden, adaptive, ltv
 
 
@@ -186,14 +192,11 @@ def screened(readings: Sequence[Reading]) -> list[Evidence]:
     ridden, adaptive, ltv = shared_indices(shared)
     evidence = []
     for reading in readings:
-        setup = reading.setup
         length = np.full_like(ridden.length, reading.fixed_length)
-        fixed = law(constant_length(setup), reading, length, np.zeros_like(length))
-        linear = Driver(fixed, SwayModel(setup.crane, setup.settings, reading.sway_state))
-        by_model, corrected = reading.sway_state != "measured", reading.sway_state == "corrected"
-        own = found(shared, ridden, linear, Eyes(by_model, corrected, reading.fixed_length))
+        fixed = law(constant_length(reading.setup), reading, length, np.zeros_like(length))
+        linear = found(shared, ridden, Driver.of(fixed, reading, reading.sway_state))
         every = {
-            "linear": own,
+            "linear": linear,
             **dict.fromkeys(("adaptive", "nmpc-a"), adaptive),
             **dict.fromkeys(("ltv", "nmpc-b"), ltv),
         }
@@ -201,43 +204,49 @@ def screened(readings: Sequence[Reading]) -> list[Evidence]:
             {name: {i: values[half] for i, values in own.items()} for name, own in every.items()}
             for half in (slice(HALF), slice(HALF, None))
         )
-        evidence.append(Evidence(setup, *parts))
+        evidence.append(Evidence(reading.setup, *parts))
     return evidence
 
 
-def found(shared: Reading, ridden: Rides, driver: Driver, eyes: Eyes) -> dict[str, Array]:
+def found(shared: Reading, ridden: Rides, driver: Driver) -> dict[str, Array]:
     """Indices of a driver over all rides."""
-    cables = np.stack(ridden, axis=1)
-    signals = np.array([played(shared, c, driver, i, eyes) for i, c in enumerate(cables)])
-    return indices(ridden, signals, shared.setup.crane.control_period)
+    signals = [
+        played(shared, cable, node, driver)
+        for cable, node in zip(np.stack(ridden, axis=1), driver.law.node, strict=True)
+    ]
+    return indices(ridden, np.array(signals), shared.setup.crane.control_period)
 
 
-def played(shared: Reading, cable: Array, driver: Driver, ride: int, eyes: Eyes) -> Array:
+def played(shared: Reading, cable: Array, node: NDArray[np.intp], driver: Driver) -> Array:
     """Signals of one ride, see `ride`; where a limit is in the way, its program is solved.
 
     Args:
         shared: the reading.
         cable: w, l, l' and the mean l' of each control period, shape (4, STEPS).
+        node: which of the law's cables is met when, shape (STEPS,).
         driver: the MPC.
-        ride: its number.
-        eyes: what the MPC starts from.
     """
-    crane, run = shared.setup.crane, compiled_ride()
-    held = crane.control_period * shared.held_periods
+    period, run = shared.setup.crane.control_period, compiled_ride()
     limits, program = _program(shared)
-    own, turn = driver.law, driver.sway_model.turn
     state, seen, signals = np.zeros(6), np.zeros(4), np.empty((4, STEPS))
-    bounds = Limits(*limits.acceleration_range, *limits.velocity_range)
+    fixed = (
+        cable,
+        node,
+        driver.law.gain,
+        period,
+        period * shared.held_periods,
+        driver.turn,
+        driver.eyes,
+        Limits(*limits.acceleration_range, *limits.velocity_range),
+    )
     step, forced = 0, math.nan
-    while True:
-        rest = (cable, own.node[ride], own.gain, crane.control_period, held, turn, eyes, bounds)
-        step = run(step, forced, state, seen, signals, *rest)
-        if step == STEPS:
-            return signals
-        node, velocity = own.node[ride, step], float(state[1])
-        gradient = own.gradient[node] @ seen
-        moves = program.solve(own.hessian[node], gradient, *limits.bounds(velocity)).minimiser
+    while (step := run(step, forced, state, seen, signals, *fixed)) < STEPS:
+        met, velocity = node[step], float(state[1])
+        gradient = driver.law.gradient[met] @ seen
+        bounds = limits.bounds(velocity)
+        moves = program.solve(driver.law.hessian[met], gradient, *bounds).minimiser
         forced = limits.saturate(math.nan if moves is None else float(moves[0]), velocity)
+    return signals
 
 
 @functools.lru_cache(maxsize=1)
