@@ -29,7 +29,7 @@ from crane_env.support import checks
 from crane_env.support.fixed import fixed
 from crane_env.tasks.judge import TaskJudge
 from crane_env.tasks.registry import TaskSpec, check_task, make_task, task_of_episode
-from crane_env.tasks.task import Task, set_upon
+from crane_env.tasks.task import Task, check_has_task, set_upon
 
 if TYPE_CHECKING:
     from crane_env.rendering.scene import CraneRenderer
@@ -228,6 +228,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         given = self._default_task
         if "task" in placed:
             given = make_task(placed.pop("task"))
+        check_has_task(operator, given)
         start = start_of(placed)
         check_task(given, self._parameters, start.coordinates(self._parameters).state)
         super().reset(seed=None if seed is None else checks.seed(seed))

@@ -42,7 +42,7 @@ from crane_env.support.fixed import fixed
 from crane_env.tasks.drawn import DrawnTasks
 from crane_env.tasks.judge import TaskJudge, VectorJudge
 from crane_env.tasks.registry import VectorTaskSpec, check_task, make_tasks, task_of_episode
-from crane_env.tasks.task import Task
+from crane_env.tasks.task import Task, check_has_task
 
 if TYPE_CHECKING:
     from crane_env.rendering.scene import VectorRenderer
@@ -242,6 +242,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         tasks = self._default_tasks
         if "task" in placed:
             tasks = make_tasks(placed.pop("task"), self.num_envs)
+        for index in np.flatnonzero(chosen).tolist():
+            check_has_task(operators[index], tasks[index])
         starts = starts_of_each(placed, chosen, self._parameters)
         seeds = seeds_of_each(seed, self.num_envs)
         indices = np.flatnonzero(chosen)

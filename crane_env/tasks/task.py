@@ -208,7 +208,10 @@ def _part(kind: type[Part], given: Any) -> Part:
 
 
 class Pursuer(Protocol):
-    """An operator who can be given a task, besides what every `Operator` does."""
+    """An operator who can be given a task, besides what every `Operator` does.
+
+    Who has nothing to do without one says so by an attribute `needs_task` that is true.
+    """
 
     def pursue(self, task: Task, stage: int) -> None:
         """Turns to goal number `stage` of a task.
@@ -216,6 +219,19 @@ class Pursuer(Protocol):
         The environment calls it right after the operator's `reset` and before its first `press`,
         and again in the control step in which a goal was reached and the next one counts.
         """
+
+
+def check_has_task(operator: object, given: object) -> None:
+    """Makes sure that an operator who needs a task is given one.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if given is None and getattr(operator, "needs_task", False):
+        raise ValueError(
+            "A person needs a task: give one to gymnasium.make or among the options of reset, as "
+            'task="position".'
+        )
 
 
 def set_upon(operator: object, task: Task, stage: int) -> bool:

@@ -29,6 +29,8 @@ class PersonOperator:
         person: what he or she is like.
     """
 
+    needs_task = True
+
     def __init__(self, person: Person) -> None:
         self.program = person
         self._begin(np.random.default_rng(0), CraneParameters())

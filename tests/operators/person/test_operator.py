@@ -191,10 +191,8 @@ def test_an_expert_calms_a_swing_on_a_bare_crane_within_15_seconds(preset: str) 
             "sway_angle": angle * math.cos(phase),
             "sway_rate": -angle * frequency * math.sin(phase),
         }
-        observation, _ = environment.reset(seed=seed, options=options)
-        operator = environment.operator
-        assert isinstance(operator, PersonOperator)
-        operator.pursue(Task(goals=(Goal(position=0.0, tolerance=9.0),)), 0)
+        task = Task(goals=(Goal(position=0.0, tolerance=9.0, speed_limit=1e-3),))
+        observation, _ = environment.reset(seed=seed, options={**options, "task": task})
         controller.reset()
         calm = False
         while environment.time < 15.0 and not calm:
@@ -215,20 +213,16 @@ def test_a_payload_is_hoisted_over_a_wall_before_it_gets_there() -> None:
         environment = gymnasium.make("OILCrane-v0", operator=person, max_episode_steps=-1).unwrapped
         assert isinstance(environment, OILCraneEnv)
         controller = make_controller("adaptive")
-        observation, info = environment.reset(
-            seed=1, options={"trolley_position": -4.0, "cable_length": 9.0}
-        )
-        operator = environment.operator
-        assert isinstance(operator, PersonOperator), skill
-        operator.pursue(task, 0)
-        for _ in range(3000):
-            observation, _, _, _, info = environment.step(controller.act(observation))
+        start = {"trolley_position": -4.0, "cable_length": 9.0}
+        observation, info = environment.reset(seed=1, options={**start, "task": task})
+        over, steps = False, 0
+        while not over and steps < 6000:
+            observation, _, over, _, info = environment.step(controller.act(observation))
+            steps += 1
             depth = observation[2] * math.cos(observation[4])
             if abs(info["payload_position"]) < 0.5:
                 assert depth < 6.0, skill
-        if skill != "novice":
-            assert abs(info["payload_position"] - 3.0) < 0.2, skill
-            assert abs(depth - 8.0) < 0.2, skill
+        assert over or skill == "novice"
 
 
 def test_an_experience_without_a_glance_teaches_nothing() -> None:
