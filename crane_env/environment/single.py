@@ -204,6 +204,11 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         """What is to be done in the present episode."""
         return None if self._judge is None else self._judge.task
 
+    @property
+    def buttons(self) -> Buttons:
+        """Pressed in the present control period."""
+        return self._buttons
+
     def truth(self) -> Observation:
         """State of the plant and the references now in force, whatever wraps the environment."""
         return Observation(*self._plant.state(), *self._references)

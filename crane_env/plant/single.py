@@ -180,6 +180,10 @@ class Plant:
             state, tension = self.measure()
         return Outcome(state, tension, travel.acceleration, travel.limited, failed)
 
+    def strike(self, speed: float) -> None:
+        """Strikes the payload across the cable, so that its speed changes by this [m/s]."""
+        self._velocity[SWAY] += speed / self._position[REACH]
+
     def _set_cable_gains(self, unstretched_length: float) -> None:
         parameters = self._parameters
         _, self._cable_gains[1], self._cable_gains[2] = cable_gains(

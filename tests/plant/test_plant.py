@@ -493,3 +493,11 @@ def test_a_start_is_the_state_that_follows_and_that_is_drawn() -> None:
 def test_reset_refuses_what_is_out_of_range_and_names_it(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=rf"{name} must be from .* to .*"):
         Plant(PAPER).reset(Start(**{name: value}))
+
+
+def test_a_blow_changes_the_speed_of_the_payload_alone() -> None:
+    plant = Plant(CraneParameters())
+    plant.strike(0.4)
+    state = plant.state()
+    assert state.cable_length * state.sway_rate == pytest.approx(0.4)
+    assert (state.trolley_velocity, state.cable_rate) == (0.0, 0.0)

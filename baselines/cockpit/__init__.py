@@ -1,0 +1,1 @@
+"""The cockpit: one page on which a person drives the crane, and the processes behind it."""
