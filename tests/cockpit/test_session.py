@@ -1,4 +1,4 @@
-"""Session: whatever is heard, the crane keeps its limits, stops after silence and can be repeated."""
+"""Session: whatever is heard, the crane keeps its limits, stops after silence, can be repeated."""
 
 from __future__ import annotations
 
