@@ -13,6 +13,7 @@ from crane_env.controller import Controller
 from crane_env.episode.metrics import Metrics
 from crane_env.episode.play import run_episode, run_episodes
 from crane_env.episode.practice import practise
+from crane_env.episode.recording import replay
 from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import CraneState, Observation
 from crane_env.operators.base import ButtonEvent, Buttons, Operator
@@ -63,6 +64,7 @@ __all__ = [
     "make_task",
     "practise",
     "read_script",
+    "replay",
     "run_episode",
     "run_episodes",
     "write_script",

@@ -24,7 +24,8 @@ from baselines.mpc.settings import MpcSettings
 from baselines.registry import make_controller, settings_type
 from crane_env import CraneParameters, Trajectory, run_episode
 from crane_env.controller import Controller
-from crane_env.operators.registry import operator_program
+from crane_env.environment.options import start_of
+from crane_env.operators.registry import make_operator, operator_program
 from crane_env.stage_cost import StageCost
 from crane_env.support import checks
 
@@ -150,12 +151,14 @@ def episode_specs(
         setup: what all episodes have in common.
 
     Raises:
-        ValueError: an unknown operator, a malformed script, something that is no seed, nothing to
-            play, or more than `MOST_EPISODES` episodes.
+        ValueError: an unknown operator, a malformed script, a recording of another crane, something
+            that is no seed, nothing to play, or more than `MOST_EPISODES` episodes.
         FileNotFoundError: a script that is not there.
     """
     names = list(dict.fromkeys(controllers))
     programs = [operator_program(name) for name in dict.fromkeys(operators)]
+    for program in programs:
+        start_of({}, make_operator(program), setup.crane)  # a recording is of one crane
     # A range of seeds may be longer than there is memory.
     some = list(itertools.islice(seeds, MOST_EPISODES + 1))
     if len(names) * len(programs) * len(some) > MOST_EPISODES:
@@ -192,7 +195,12 @@ def play(spec: EpisodeSpec) -> Trajectory:
         observation, _ = env.reset(seed=spec.seed)  # whoever the operator is, it starts alike
         controller.act(observation)
         return run_episode(
-            env, controller, seed=spec.seed, options=options, max_steps=setup.max_steps
+            env,
+            controller,
+            seed=spec.seed,
+            options=options,
+            max_steps=setup.max_steps,
+            controller_name=spec.controller,
         )
     except BaseException:  # whatever it left them in, nothing is used again
         _environment.cache_clear()

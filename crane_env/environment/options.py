@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crane_env.observation import CraneState
+from crane_env.operators.base import Operator
+from crane_env.operators.recording import RecordedButtons
 from crane_env.parameters import CraneParameters
 from crane_env.plant.start import Start
 from crane_env.support import checks
@@ -17,13 +20,23 @@ TASK_STREAM = 2
 """Beside an episode's number, the seed of its task."""
 
 
-def start_of(options: Mapping[str, Any]) -> Start:
-    """Where options of numbers let a crane begin.
+def start_of(options: Mapping[str, Any], operator: Operator, parameters: CraneParameters) -> Start:
+    """Where options of numbers let a crane begin; else where its operator's recording did.
 
     Raises:
-        ValueError: a value that is no number.
+        ValueError: a value that is no number or out of range, or another crane or start than the
+            recording's.
     """
-    return Start(**{name: real(name, value) for name, value in options.items()})
+    numbers = {name: real(name, value) for name, value in options.items()}
+    recording = getattr(operator, "program", None)
+    if not isinstance(recording, RecordedButtons):
+        start = Start(**numbers)
+    else:
+        recorded = {name: getattr(recording.start, name) for name in Start._fields}
+        start = Start(**{**recorded, **numbers})
+        recording.check(parameters, CraneState(**start._asdict(), cable_rate=0.0))
+    start.coordinates(parameters)
+    return start
 
 
 def read_options(options: object, *others: str) -> dict[str, Any]:
@@ -42,17 +55,21 @@ def read_options(options: object, *others: str) -> dict[str, Any]:
 
 
 def starts_of_each(
-    options: Mapping[str, Any], chosen: NDArray[np.bool_], parameters: CraneParameters
+    options: Mapping[str, Any],
+    chosen: NDArray[np.bool_],
+    operators: Sequence[Operator],
+    cranes: Sequence[CraneParameters],
 ) -> list[Start]:
     """Where each of the chosen cranes begins.
 
     Args:
         options: a number, or a sequence or array with one for each crane, for fields of `Start`.
         chosen: the cranes that are reset, shape (N,).
-        parameters: the cranes' limits.
+        operators: of all cranes.
+        cranes: all of them.
 
     Raises:
-        ValueError: a sequence of another length, or a value that is no number or out of its range.
+        ValueError: a sequence of another length, or as `start_of`.
     """
     columns: dict[str, list[Any]] = {}
     for name, value in options.items():
@@ -68,11 +85,10 @@ def starts_of_each(
     starts = []
     for index in np.flatnonzero(chosen).tolist():
         try:
-            start = start_of({name: column[index] for name, column in columns.items()})
-            start.coordinates(parameters)
+            given = {name: column[index] for name, column in columns.items()}
+            starts.append(start_of(given, operators[index], cranes[index]))
         except ValueError as error:
             raise ValueError(f"Environment {index}: {error}") from error
-        starts.append(start)
     return starts
 
 

@@ -175,9 +175,11 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         self.action_space = Box(-limit, limit, (1,), dtype=np.float32)
         self.observation_space = observation_space(self._parameters)
         self._default_operator = own_operator(operator)
+        start = start_of({}, self._default_operator, self._parameters)
         self._operator = self._default_operator
         self._default_task = make_task(task)
-        check_task(self._default_task, self._parameters, self._plant.state())
+        begun = start.coordinates(self._parameters).state
+        check_task(self._default_task, self._parameters, begun)
         self._judge: TaskJudge | None = None
         self._step_index = 0
         self._due = -math.inf
@@ -234,7 +236,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         if "task" in placed:
             given = make_task(placed.pop("task"))
         check_has_task(operator, given)
-        start = start_of(placed)
+        start = start_of(placed, operator, self._parameters)
         check_task(given, self._parameters, start.coordinates(self._parameters).state)
         super().reset(seed=None if seed is None else checks.seed(seed))
         self._plant.reset(start)

@@ -35,7 +35,7 @@ from crane_env.operators.base import Operator
 from crane_env.operators.batch import VectorOperator, VectorOperatorSpec, make_operators
 from crane_env.parameters import CraneParameters
 from crane_env.plant.batch import VectorPlant
-from crane_env.plant.start import AT_REST, Start
+from crane_env.plant.start import Start
 from crane_env.stage_cost import StageCost
 from crane_env.support.checks import choice, whole
 from crane_env.support.fixed import fixed
@@ -163,9 +163,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._parameters = self._own_parameters[0]
         self._plant = VectorPlant(self._own_parameters, threads=threads)
         self._default_operators = make_operators(operator, self.num_envs)
+        everyone = np.ones(self.num_envs, dtype=np.bool_)
+        starts = starts_of_each({}, everyone, self._default_operators, self._own_parameters)
         self._operator = VectorOperator(self.num_envs)
         self._default_tasks = make_tasks(task, self.num_envs)
-        self._check_tasks(self._default_tasks, dict.fromkeys(range(self.num_envs), AT_REST))
+        self._check_tasks(self._default_tasks, dict(enumerate(starts)))
         self._judge = VectorJudge(self.num_envs)
 
         frames = max(1, round(1.0 / self._parameters.control_period))
@@ -202,6 +204,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
     def tasks(self) -> tuple[Task | None, ...]:
         """What is to be done by each crane in its present episode."""
         return tuple(None if judge is None else judge.task for judge in self._judge.judges)
+
+    @property
+    def operators(self) -> tuple[Operator | None, ...]:
+        """Who presses the buttons of each crane in its present episode; None before the first."""
+        return self._operator.operators
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -244,10 +251,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             tasks = make_tasks(placed.pop("task"), self.num_envs)
         for index in np.flatnonzero(chosen).tolist():
             check_has_task(operators[index], tasks[index])
-        starts = starts_of_each(placed, chosen, self._parameters)
+        starts = starts_of_each(placed, chosen, operators, self._own_parameters)
         seeds = seeds_of_each(seed, self.num_envs)
         indices = np.flatnonzero(chosen)
-        if placed or tasks is not self._default_tasks:
+        default = tasks is self._default_tasks and operators is self._default_operators
+        if placed or not default:
             self._check_tasks(tasks, dict(zip(indices.tolist(), starts, strict=True)))
         randoms = {
             index: seeding.np_random(seeds[index])
@@ -323,8 +331,9 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         state: Any = outcome.state
         if beginning.any():
             indices = np.flatnonzero(beginning)
-            starts = [AT_REST] * len(indices)
-            self._begin(indices, self._default_operators, self._default_tasks, starts)
+            operators, cranes = self._default_operators, self._own_parameters
+            starts = starts_of_each({}, beginning, operators, cranes)
+            self._begin(indices, operators, self._default_tasks, starts)
             state, tension = self._plant.measure()
             begun = report_start(state, tension)
             info = {key: np.where(beginning, begun[key], info[key]) for key in begun}

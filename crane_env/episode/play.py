@@ -20,6 +20,8 @@ from gymnasium.wrappers import TimeLimit
 from numpy.typing import NDArray
 
 from crane_env.controller import Controller, check_controller, reported_failures
+from crane_env.environment.options import seeds_of_each
+from crane_env.episode.origin import Origin
 from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import Observation
 from crane_env.operators.script import ButtonScript
@@ -62,6 +64,7 @@ def run_episode(
     seed: int | None = None,
     options: dict[str, Any] | None = None,
     max_steps: int | None = None,
+    controller_name: str | None = None,
 ) -> Trajectory:
     """Plays one episode; `act` is timed from outside, the same way for every controller.
 
@@ -74,6 +77,7 @@ def run_episode(
         options: options of the reset.
         max_steps: stop once the crane has moved for this many control periods (a wrapper that
             repeats an action ends its repetition); None: when the environment says so.
+        controller_name: what the controller is called in the record; None: its class.
 
     Raises:
         ValueError: before anything is played, something that is no OILCrane environment or no
@@ -89,7 +93,7 @@ def run_episode(
             f"them in an OILCraneVectorEnv; this is {checks.shown(env)}."
         )
     _check(controller, _has_time_limit(env), max_steps, [seed])
-    (trajectory,) = _play(env, controller, seed, options, max_steps)
+    (trajectory,) = _play(env, controller, seed, options, max_steps, controller_name)
     inner: Any = env.unwrapped
     _warn_of_silence(inner.operator, float(trajectory.time[-1]))
     return trajectory
@@ -102,6 +106,7 @@ def run_episodes(
     seed: int | Sequence[int | None] | None = None,
     options: dict[str, Any] | None = None,
     max_steps: int | None = None,
+    controller_name: str | None = None,
 ) -> list[Trajectory]:
     """Plays one episode of every crane, as `run_episode` plays one of one.
 
@@ -116,6 +121,7 @@ def run_episodes(
         seed: seed of the reset; crane i gets seed + i or entry i of a list.
         options: options of the reset.
         max_steps: stop after this many control periods; None: when the environment says so.
+        controller_name: what the controller is called in the records; None: its class.
 
     Returns:
         N trajectories.
@@ -136,7 +142,7 @@ def run_episodes(
         )
     seeds = np.atleast_1d(np.array(seed, dtype=object)).tolist()
     _check(controller, inner.max_episode_steps is not None, max_steps, seeds)
-    return _play(env, controller, seed, options, max_steps)
+    return _play(env, controller, seed, options, max_steps, controller_name)
 
 
 def _has_time_limit(env: gymnasium.Env[Any, Any]) -> bool:
@@ -173,19 +179,26 @@ def _warn_of_silence(operator: object, last_step: float) -> None:
 
 
 def _play(
-    env: Any, controller: Controller, seed: Any, options: dict[str, Any] | None, max_steps: Any
+    env: Any,
+    controller: Controller,
+    seed: Any,
+    options: dict[str, Any] | None,
+    max_steps: Any,
+    controller_name: str | None,
 ) -> list[Trajectory]:
     many = isinstance(env, VectorEnv)
     over: Callable[[Any], Any] = np.all if many else bool
     inner = env.unwrapped
     listener = inner.recorder
     values: list[tuple[Any, ...]] = []  # of each record, in the order of BEFORE and AFTER
+    pressed: list[NDArray[np.bool_]] = []  # buttons of each record
     acts: list[tuple[int, float]] = []  # control period and duration [s]
     ended: Any = False
 
     def record(one: StepRecord) -> None:
         time, observation, info, action, reward = one
         values.append((time, *observation, *state_of(info), action, reward, *earned_of(info)))
+        pressed.append(info["buttons"].copy())
         if listener is not None:
             listener(one)
 
@@ -195,8 +208,14 @@ def _play(
         if not values:
             raise ValueError(f"The reset of {checks.shown(env)} does not reach its crane.")
         # A wrapper may have reset more than once, or stepped within its reset.
-        del values[: np.flatnonzero(_all_placed(values))[-1]]
+        before = np.flatnonzero(_all_placed(values))[-1]
+        del values[:before], pressed[:before]
         cranes = inner.cranes if many else (inner.parameters,)
+        operators = inner.operators if many else (inner.operator,)
+        origins = [
+            Origin.now(operator, controller_name or type(controller).__name__, one, inner.cost)
+            for operator, one in zip(operators, seeds_of_each(seed, len(cranes)), strict=True)
+        ]
         controller.reset()
         while not over(ended):
             start = perf_counter()
@@ -209,7 +228,7 @@ def _play(
     finally:
         inner.recorder = listener
     failures = 0 if many else reported_failures(controller)
-    return _trajectories(values, acts, cranes, failures)
+    return _trajectories(values, pressed, acts, cranes, origins, failures)
 
 
 def _all_placed(values: list[tuple[Any, ...]]) -> NDArray[np.bool_]:
@@ -221,14 +240,17 @@ def _all_placed(values: list[tuple[Any, ...]]) -> NDArray[np.bool_]:
 
 def _trajectories(
     values: list[tuple[Any, ...]],
+    pressed: list[NDArray[np.bool_]],
     acts: list[tuple[int, float]],
     cranes: Sequence[CraneParameters],
+    origins: Sequence[Origin],
     solver_failures: int,
 ) -> list[Trajectory]:
     """The trajectory of each crane; one row a control period, from one record to the next."""
     begun_anew = np.flatnonzero(_all_placed(values))[1:2]
     table = np.array(values[: begun_anew[0]] if begun_anew.size else values, dtype=np.float64)
     table = table.reshape(len(table), len(BEFORE) + len(AFTER), len(cranes)).transpose(1, 2, 0)
+    buttons = np.array(pressed).reshape(len(pressed), len(cranes), -1)
     columns = dict(zip(BEFORE, table[:, :, :-1], strict=False))
     columns |= dict(zip(AFTER, table[len(BEFORE) :, :, 1:], strict=True))
     failed = columns.pop("simulation_failed")
@@ -246,9 +268,11 @@ def _trajectories(
                 for name, column in columns.items()
             },
             act_time=act_time[:length],
+            buttons=buttons[:length, index].copy(),
             parameters=crane,
+            origin=origin,
             solver_failures=solver_failures,
             simulation_failed=bool(failed[index, length - 1]),
         )
-        for index, (crane, length) in enumerate(zip(cranes, lengths, strict=True))
+        for index, (crane, origin, length) in enumerate(zip(cranes, origins, lengths, strict=True))
     ]

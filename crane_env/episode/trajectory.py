@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
@@ -12,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crane_env.episode.metrics import Metrics, after_release, integral_absolute_error
+from crane_env.episode.origin import Origin
+from crane_env.operators.base import ButtonEvent, Buttons
+from crane_env.operators.recording import ENVIRONMENT, FORMAT, button_events, check_environment
 from crane_env.parameters import CraneParameters
 from crane_env.support import checks
-from crane_env.support.atomic_file import atomic_file
 from crane_env.support.extras import require
+from crane_env.support.parquet import read_parquet, write_parquet
 
-FORMAT = "oilcrane-trajectory-2"
-"""Version of the Parquet layout."""
-
-KEPT_APART = ("parameters", "solver_failures", "simulation_failed")
+KEPT_APART = ("parameters", "origin", "solver_failures", "simulation_failed")
 """What is no column of the table, but JSON among its metadata."""
 
 SPEED_TOLERANCE = 0.02
@@ -34,8 +33,8 @@ Flags = NDArray[np.bool_]
 class Trajectory:
     """Record of an episode, one row a control period: where the crane was, what it did and earned.
 
-    All arrays have shape (N,). Positions, velocities and references at row k are those that the
-    plant had when its operator's buttons were read; `action` is what the plant was asked for,
+    All arrays but one have shape (N,). Positions, velocities and references at row k are those that
+    the plant had when its operator's buttons were read; `action` is what the plant was asked for,
     `acceleration` what its drive made of it, and the rewards are those of the step that followed.
     Whatever wraps the environment, all of this is the plant's own.
 
@@ -54,7 +53,9 @@ class Trajectory:
             `reward_acceleration`.
         act_time: duration of the controller's `act`, by the wall clock [s]; nan in a control period
             in which it was not asked because a wrapper repeats actions.
+        buttons: pressed, in the order of `Buttons`, shape (N, 4).
         parameters: the crane.
+        origin: what the episode was played with.
         solver_failures: answers that were a fallback's, see `crane_env.controller`.
         simulation_failed: the simulation diverged in the last step, where the episode ends. What
             was played until then is no measure of the controller and belongs in no mean.
@@ -84,7 +85,9 @@ class Trajectory:
     reward_sway: Annotated[Reals, "m^2/s"]
     reward_acceleration: Annotated[Reals, "m^2/s"]
     act_time: Annotated[Reals, "s"]
+    buttons: Flags
     parameters: CraneParameters
+    origin: Origin = field(default_factory=Origin)
     solver_failures: int = 0
     simulation_failed: bool = False
 
@@ -99,6 +102,9 @@ class Trajectory:
                 )
         if len(rows) != 1 or not rows[0]:
             raise ValueError("A trajectory has one or more rows.")
+        shape, given = (*rows, len(Buttons._fields)), self.buttons
+        if not isinstance(given, np.ndarray) or given.dtype != np.bool_ or given.shape != shape:
+            raise ValueError(f"Buttons of a trajectory must be an array of bool of shape {shape}.")
 
     def __len__(self) -> int:
         """Number of control periods."""
@@ -116,6 +122,10 @@ class Trajectory:
         """Indices of the episode; see `crane_env.episode.metrics`."""
         return measure(self)
 
+    def schedule(self) -> tuple[ButtonEvent, ...]:
+        """The changes of the buttons, an operator for any crane; released after the last row."""
+        return button_events(self.buttons, self.parameters.control_period)
+
     def columns(self) -> dict[str, NDArray[Any]]:
         """Arrays by name, in order of declaration."""
         return {name: getattr(self, name) for name in UNITS}
@@ -126,33 +136,21 @@ class Trajectory:
         Raises:
             ImportError: pandas is missing; the message names the extra.
         """
-        return require("pandas", extra="results").DataFrame(self.columns())
+        return require("pandas", extra="results").DataFrame(self._table())
 
     def to_parquet(self, path: str | Path) -> None:
         """Writes the trajectory; the file appears whole or not at all.
 
-        Each column's metadata have its `unit`.
+        The file is a recording: `operator="recording:FILE"` presses its buttons again.
 
         Raises:
             ImportError: pyarrow is missing; the message names the extra.
             OSError: the file cannot be written.
         """
-        pyarrow = require("pyarrow", extra="results")
-        parquet = require("pyarrow.parquet", extra="results")
-        metadata = {"format": FORMAT} | {
-            key: json.dumps(getattr(self, key), default=dataclasses.asdict) for key in KEPT_APART
-        }
-        columns = {name: pyarrow.array(values) for name, values in self.columns().items()}
-        schema = pyarrow.schema(
-            [
-                pyarrow.field(name, values.type, metadata={"unit": UNITS[name]})
-                for name, values in columns.items()
-            ],
-            metadata=metadata,
-        )
-        with atomic_file(checks.path(path)) as partial:
-            table = pyarrow.table(columns, schema=schema)
-            parquet.write_table(table, partial, use_dictionary=False, write_page_checksum=True)
+        said = {name: getattr(self, name) for name in KEPT_APART}
+        said |= {name: dataclasses.asdict(said[name]) for name in ("parameters", "origin")}
+        said["environment"] = ENVIRONMENT
+        write_parquet(path, FORMAT, self._table(), MEANINGS, said)
 
     @classmethod
     def from_parquet(cls, path: str | Path) -> Trajectory:
@@ -163,44 +161,28 @@ class Trajectory:
             FileNotFoundError: there is no such file.
             ValueError: the file is no whole trajectory of this version; the message says why.
         """
-        pyarrow = require("pyarrow", extra="results")
-        parquet = require("pyarrow.parquet", extra="results")
-        name = checks.regular_file("trajectory", path)
-        with name.open("rb") as file:
-            try:
-                table = parquet.read_table(file, page_checksum_verification=True)
-            except (pyarrow.ArrowException, OSError) as error:
-                raise ValueError(
-                    f"{name} is not a Parquet file, or not a whole one: {error}"
-                ) from error
-        metadata = {
-            key.decode(errors="replace"): value
-            for key, value in (table.schema.metadata or {}).items()
-        }
-        found = metadata.get("format", b"").decode(errors="replace")
-        if found != FORMAT:
-            known = found.startswith(FORMAT.rstrip("0123456789"))
-            advice = (
-                "; another version of oilcrane wrote it: play the episode again" if known else ""
-            )
+        columns, said = read_parquet(path, "trajectory", FORMAT)
+        wrong = sorted(set(MEANINGS) ^ set(columns))
+        if wrong:
             raise ValueError(
-                f"{name} is not a trajectory of format {FORMAT!r}, but {found!r}{advice}."
-            )
-        wrong = sorted(set(UNITS) ^ set(table.column_names))
-        if wrong or table.num_columns != len(UNITS):
-            raise ValueError(
-                f"{name} has not the columns of a trajectory; missing or too many: {wrong}."
+                f"{path} has not the columns of a trajectory; missing or too many: {wrong}."
             )
         try:
-            said = {key: json.loads(metadata[key]) for key in KEPT_APART}
+            check_environment(said["environment"])
             return cls(
-                **{column: table[column].to_numpy() for column in UNITS},
+                **{name: columns[name] for name in UNITS},
+                buttons=np.stack([columns[name] for name in Buttons._fields], axis=1),
                 parameters=CraneParameters.of(said["parameters"]),
+                origin=Origin(**said["origin"]),
                 solver_failures=checks.whole("solver_failures", said["solver_failures"]),
-                simulation_failed=said["simulation_failed"] is True,
+                simulation_failed=checks.flag("simulation_failed", said["simulation_failed"]),
             )
-        except (KeyError, ValueError) as error:
-            raise ValueError(f"{name} is not a whole trajectory: {error}") from error
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path} is not a whole trajectory: {error}") from error
+
+    def _table(self) -> dict[str, NDArray[Any]]:
+        """Columns and buttons, as they stand in a table."""
+        return self.columns() | dict(zip(Buttons._fields, self.buttons.T, strict=True))
 
 
 UNITS: dict[str, str] = {
@@ -209,6 +191,11 @@ UNITS: dict[str, str] = {
     if hasattr(hint, "__metadata__")
 }
 """Unit of each column, in order."""
+
+MEANINGS = {name: {"unit": unit} for name, unit in UNITS.items()} | {
+    name: {"unit": ""} for name in Buttons._fields
+}
+"""What the file says of each column."""
 
 
 def measure(trajectory: Trajectory) -> Metrics:

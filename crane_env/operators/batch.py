@@ -69,6 +69,11 @@ class VectorOperator:
         self._parameters: list[CraneParameters | None] = [None] * count
         self._due = np.full(count, np.inf)
 
+    @property
+    def operators(self) -> tuple[Operator | None, ...]:
+        """The operator of each crane; None where none has taken its place."""
+        return tuple(self._operators)
+
     def reset(
         self,
         index: int,

@@ -8,13 +8,16 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from crane_env.observation import CraneState
 from crane_env.operators.base import ButtonEvent, Operator, Program, ScheduledOperator
 from crane_env.operators.manoeuvre import RandomManoeuvre
 from crane_env.operators.person.operator import PersonOperator
 from crane_env.operators.person.person import PERSONS, Person
+from crane_env.operators.recording import RecordedButtons, read_recording
 from crane_env.operators.script import ButtonScript, read_script
 from crane_env.operators.semi_markov import RandomButtons
 from crane_env.operators.table1 import TABLE_1, Table1Manoeuvre
+from crane_env.parameters import CraneParameters
 from crane_env.support.checks import shown
 from crane_env.support.factory import FactoryError, found_at, is_place, placed_errors
 from crane_env.support.fields import with_fields
@@ -27,9 +30,12 @@ TABLE_1_NUMBERS = [str(number) for number in range(1, len(TABLE_1) + 1)]
 
 VALID_NAMES = (
     f"random, stress, manoeuvre, table1:1 … table1:{len(TABLE_1)}, person:{'|'.join(PERSONS)}, "
-    "script:FILE, package.module:factory"
+    "script:FILE, recording:FILE, package.module:factory"
 )
-FAMILIES = ("random", "stress", "manoeuvre", "table1", "person", "script")
+NOWHERE = CraneState(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+"""Start of a recording of which all fields are yet to be given."""
+
+FAMILIES = ("random", "stress", "manoeuvre", "table1", "person", "script", "recording")
 """What the names of operators begin with; no module of a factory is looked for under these."""
 
 
@@ -38,17 +44,18 @@ def make_operator(spec: OperatorSpec) -> Operator:
 
     Args:
         spec: a name: "random" or "stress" (see `RandomButtons`), "manoeuvre" (`RandomManoeuvre`),
-            "table1:1" to "table1:10" (`Table1Manoeuvre`), "script:FILE" (`ButtonScript`), or
-            "package.module:factory", a function of your own that takes nothing and returns a
-            program or an operator; a mapping of a name and fields of that program, as
-            `dataclasses.asdict` makes it; a program; an operator, which is returned as it is; or a
-            sequence of `ButtonEvent`s.
+            "table1:1" to "table1:10" (`Table1Manoeuvre`), "script:FILE" (`ButtonScript`),
+            "recording:FILE" (`RecordedButtons`), or "package.module:factory", a function of your
+            own that takes nothing and returns a program or an operator; a mapping of a name and
+            fields of that program, as `dataclasses.asdict` makes it; a program; an operator, which
+            is returned as it is; or a sequence of `ButtonEvent`s.
 
     Raises:
         ValueError: an unknown name (the message lists the valid ones) or field, a value out of
-            range, a malformed script, or something that is no operator at all.
-        FileNotFoundError: there is no such script.
-        ImportError: the module of a factory of your own cannot be imported.
+            range, a malformed script or recording, or something that is no operator at all.
+        FileNotFoundError: there is no such script or recording.
+        ImportError: the module of a factory of your own cannot be imported, or a recording cannot
+            be read for want of pyarrow.
     """
     given: Any = spec
     if isinstance(given, str):
@@ -106,23 +113,35 @@ def own_operator(spec: OperatorSpec) -> Operator:
 def operator_program(name: str) -> dict[str, Any]:
     """Mapping of an operator with all its fields, from its name, which `make_operator` takes back.
 
-    It is the same before and after its way through JSON. A script's file need not be there any
-    more; of an operator of your own that is no dataclass, the name is all.
+    It is the same before and after its way through JSON. The file of a script or a recording need
+    not be there any more; of an operator of your own that is no dataclass, the name is all.
 
     Raises:
         ValueError: an unknown name or a malformed script.
         FileNotFoundError: there is no such script.
         ImportError: the module of a factory of your own cannot be imported.
     """
-    made = make_operator(name)
-    program = getattr(made, "program", made)
+    try:
+        return {**describe_operator(make_operator(name)), "name": name}
+    except TypeError as error:
+        raise ValueError(f"The fields of operator {name!r} are no plain data: {error}.") from error
+
+
+def describe_operator(operator: Operator) -> dict[str, Any]:
+    """Name and fields of an operator as plain data; of one that is no dataclass, the name is all.
+
+    Raises:
+        TypeError: the fields are no plain data.
+    """
+    program = getattr(operator, "program", operator)
+    name = str(getattr(program, "name", type(program).__name__))
     if not dataclasses.is_dataclass(program) or isinstance(program, type):
         return {"name": name}
     try:
-        described: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(program)))
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"The fields of operator {name!r} are no plain data: {error}.") from error
-    return {**described, "name": name}
+        fields: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(program)))
+    except ValueError as error:  # a circle
+        raise TypeError(str(error)) from error
+    return {**fields, "name": name}
 
 
 def _program(name: object, fields: Mapping[str, Any]) -> Any:
@@ -144,6 +163,10 @@ def _program(name: object, fields: Mapping[str, Any]) -> Any:
             program = ButtonScript((), str(name))
         case "script", ":", file if file:
             program = read_script(file)
+        case "recording", _, _ if fields.keys() >= {"schedule", "parameters", "start"}:
+            program = RecordedButtons((), CraneParameters(), NOWHERE, str(name))
+        case "recording", ":", file if file:
+            program = read_recording(file)
         case head, _, _ if head not in FAMILIES and is_place(name):
             program, own = _of_factory(str(name)), True
         case _:

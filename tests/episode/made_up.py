@@ -13,4 +13,5 @@ def made_up_trajectory(count: int, **given: NDArray[np.generic]) -> Trajectory:
     """A trajectory of zeros, the cable taut, but for the given columns of shape (count,)."""
     columns = {name: np.zeros(count, dtype=float if unit else bool) for name, unit in UNITS.items()}
     taut = {"cable_length": np.full(count, 8.0), "cable_tension": np.full(count, 981.0)}
-    return Trajectory(**{**columns, **taut, **given}, parameters=CraneParameters())
+    buttons = np.zeros((count, 4), dtype=bool)
+    return Trajectory(**{**columns, **taut, **given}, buttons=buttons, parameters=CraneParameters())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import sys
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from crane_env import Buttons, CraneParameters, Observation, Trajectory, run_episode
 from crane_env.operators.base import RELEASED
+from crane_env.operators.recording import FORMAT, read_recording
 
 
 class Pusher:
@@ -66,10 +68,13 @@ def test_parquet_gives_the_trajectory_back_bit_for_bit_and_says_its_units(tmp_pa
 
     record = trajectory(parameters=CraneParameters(payload_mass=150.0))
     record = dataclasses.replace(record, solver_failures=3, simulation_failed=True)
+    record = dataclasses.replace(record, origin=dataclasses.replace(record.origin, seed=2**63 - 1))
     record.to_parquet(tmp_path / "episode.parquet")
     again = Trajectory.from_parquet(tmp_path / "episode.parquet")
     assert again.parameters == record.parameters
     assert (again.solver_failures, again.simulation_failed) == (3, True)
+    assert again.origin == record.origin
+    assert again.buttons.tobytes() == record.buttons.tobytes()
     for name, column in record.columns().items():
         assert again.columns()[name].dtype == column.dtype
         assert again.columns()[name].tobytes() == column.tobytes()
@@ -84,7 +89,7 @@ def test_a_trajectory_has_a_short_name_and_a_data_frame() -> None:
     failed = dataclasses.replace(record, simulation_failed=True)
     assert repr(failed).endswith("25 s, simulation failed>")
     frame = record.to_pandas()
-    assert list(frame.columns) == list(record.columns())
+    assert list(frame.columns) == [*record.columns(), *Buttons._fields]
     assert frame["sway_angle"].to_numpy().tolist() == record.sway_angle.tolist()
 
 
@@ -108,9 +113,10 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (lambda t: t.drop_columns(["sway_rate"]), r"has not the columns .*\['sway_rate'\]"),
         (lambda t: t.append_column("more", t["time"]), r"has not the columns .*\['more'\]"),
         (lambda t: t.set_column(5, "sway_angle", t["action_clipped"]), "'sway_angle' .* float64"),
-        (lambda t: said(t, "oilcrane-trajectory-2"), "is not a whole trajectory: 'parameters'"),
+        (lambda t: t.set_column(21, "forward", t["time"]), "Buttons .* array of bool"),
+        (lambda t: said(t, FORMAT), "is not a whole trajectory: 'environment'"),
         (lambda t: said(t, "oilcrane-trajectory-1"), "another version .*: play the episode again"),
-        (lambda t: said(t, ""), "is not a trajectory of format 'oilcrane-trajectory-2'"),
+        (lambda t: said(t, ""), f"is not a trajectory of format '{FORMAT}'"),
     ],
 )
 def test_a_table_that_is_no_trajectory_is_refused_with_the_reason(
@@ -140,6 +146,8 @@ def test_a_file_that_was_damaged_is_never_taken_for_a_trajectory(kept: Path, dat
     )
     path = kept.with_name("damaged.parquet")
     path.write_bytes(damaged)
+    with contextlib.suppress(ValueError):
+        assert read_recording(path).schedule == read_recording(kept).schedule
     try:
         found = Trajectory.from_parquet(path)
     except ValueError:

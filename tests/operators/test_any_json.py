@@ -18,6 +18,7 @@ from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import CraneState
 from crane_env.operators.manoeuvre import RandomManoeuvre
 from crane_env.operators.person.person import Person
+from crane_env.operators.recording import RecordedButtons, read_recording
 from crane_env.operators.registry import make_operator
 from crane_env.operators.script import ButtonScript, read_script
 from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
@@ -35,9 +36,12 @@ NAMES = (
     "script",
     "script:a.csv",
     "script:a.json",
+    "recording:a.parquet",
 )
 DESCRIBED = [
-    f.name for kind in (ButtonHabits, RandomManoeuvre, Person) for f in dataclasses.fields(kind)
+    f.name
+    for kind in (ButtonHabits, RandomManoeuvre, Person, RecordedButtons)
+    for f in dataclasses.fields(kind)
 ]
 FIELDS = ("name", "time", "buttons", "schedule", "number", "travel", "hoist", *DESCRIBED)
 
@@ -99,8 +103,10 @@ def test_so_it_is_of_the_programs_themselves(kind: Any, first: Any, second: Any)
     with contextlib.suppress(ValueError):
         ButtonScript(first, second)
     with contextlib.suppress(ValueError):
+        RecordedButtons(first, PAPER, second, "recording:a.parquet")
+    with contextlib.suppress(ValueError):
         RandomButtons(travel=first, hoist=second)
-    for read in (read_script, Trajectory.from_parquet):
+    for read in (read_script, read_recording, Trajectory.from_parquet):
         with contextlib.suppress(ValueError, FileNotFoundError):
             read(first)
 

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from crane_env.observation import CraneState
 from crane_env.operators.base import RELEASED, ButtonEvent, Buttons, ScheduledOperator
 from crane_env.operators.manoeuvre import RandomManoeuvre
+from crane_env.operators.recording import RecordedButtons
 from crane_env.operators.registry import make_operator, operator_program, own_operator
 from crane_env.operators.script import ButtonScript, write_script
 from crane_env.operators.semi_markov import ButtonHabits, RandomButtons
@@ -31,7 +32,7 @@ PAPER = CraneParameters.paper()
 PRESSED = Buttons(forward=True)
 VALID = (
     "random, stress, manoeuvre, table1:1 … table1:10, person:novice|trained|expert, script:FILE, "
-    "package.module:factory"
+    "recording:FILE, package.module:factory"
 )
 
 PROGRAMS = [
@@ -44,6 +45,12 @@ PROGRAMS = [
     Table1Manoeuvre(10),
     ButtonScript(()),
     ButtonScript((ButtonEvent(1.5, PRESSED), ButtonEvent(2.0, RELEASED)), "script:gone.csv"),
+    RecordedButtons(
+        (ButtonEvent(1.5, PRESSED), ButtonEvent(2.0, RELEASED)),
+        PAPER,
+        at_rest(PAPER),
+        "recording:gone.parquet",
+    ),
 ]
 
 
