@@ -27,6 +27,7 @@ from crane_env.observation import Observation
 from crane_env.operators.script import ButtonScript
 from crane_env.parameters import CraneParameters
 from crane_env.support import checks
+from crane_env.tasks.task import Task
 
 if TYPE_CHECKING:
     from crane_env.environment.report import StepRecord
@@ -212,6 +213,7 @@ def _play(
         del values[:before], pressed[:before]
         cranes = inner.cranes if many else (inner.parameters,)
         operators = inner.operators if many else (inner.operator,)
+        tasks = inner.tasks if many else (inner.task,)
         origins = [
             Origin.now(operator, controller_name or type(controller).__name__, one, inner.cost)
             for operator, one in zip(operators, seeds_of_each(seed, len(cranes)), strict=True)
@@ -228,7 +230,7 @@ def _play(
     finally:
         inner.recorder = listener
     failures = 0 if many else reported_failures(controller)
-    return _trajectories(values, pressed, acts, cranes, origins, failures)
+    return _trajectories(values, pressed, acts, cranes, tasks, origins, failures)
 
 
 def _all_placed(values: list[tuple[Any, ...]]) -> NDArray[np.bool_]:
@@ -243,6 +245,7 @@ def _trajectories(
     pressed: list[NDArray[np.bool_]],
     acts: list[tuple[int, float]],
     cranes: Sequence[CraneParameters],
+    tasks: Sequence[Task | None],
     origins: Sequence[Origin],
     solver_failures: int,
 ) -> list[Trajectory]:
@@ -270,9 +273,12 @@ def _trajectories(
             act_time=act_time[:length],
             buttons=buttons[:length, index].copy(),
             parameters=crane,
+            task=task,
             origin=origin,
             solver_failures=solver_failures,
             simulation_failed=bool(failed[index, length - 1]),
         )
-        for index, (crane, origin, length) in enumerate(zip(cranes, origins, lengths, strict=True))
+        for index, (crane, task, origin, length) in enumerate(
+            zip(cranes, tasks, origins, lengths, strict=True)
+        )
     ]

@@ -16,7 +16,7 @@ from crane_env.operators.recording import ENVIRONMENT
 def replay(
     path: str | Path, controller: Controller, *, controller_name: str | None = None
 ) -> Trajectory:
-    """Plays a recorded episode again: same crane, start, buttons, seed and length.
+    """Plays a recorded episode again: same crane, start, buttons, task, seed and length.
 
     With the controller that drove it, the trajectory is the recorded one bit for bit, as long as no
     wrapper stood between the two; with another it is that one's.
@@ -47,5 +47,6 @@ def arguments_of(path: str | Path, recorded: Trajectory) -> dict[str, Any]:
         "operator": f"recording:{path}",
         "parameters": recorded.parameters,
         "cost": recorded.origin.cost,
+        "task": recorded.task,
         "max_episode_steps": len(recorded),
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
@@ -18,8 +17,9 @@ from crane_env.parameters import CraneParameters
 from crane_env.support import checks
 from crane_env.support.extras import require
 from crane_env.support.parquet import read_parquet, write_parquet
+from crane_env.tasks.task import Task
 
-KEPT_APART = ("parameters", "origin", "solver_failures", "simulation_failed")
+KEPT_APART = ("parameters", "task", "origin", "solver_failures", "simulation_failed")
 """What is no column of the table, but JSON among its metadata."""
 
 SPEED_TOLERANCE = 0.02
@@ -55,6 +55,7 @@ class Trajectory:
             in which it was not asked because a wrapper repeats actions.
         buttons: pressed, in the order of `Buttons`, shape (N, 4).
         parameters: the crane.
+        task: that the operator was given; None: none.
         origin: what the episode was played with.
         solver_failures: answers that were a fallback's, see `crane_env.controller`.
         simulation_failed: the simulation diverged in the last step, where the episode ends. What
@@ -87,6 +88,7 @@ class Trajectory:
     act_time: Annotated[Reals, "s"]
     buttons: Flags
     parameters: CraneParameters
+    task: Task | None = None
     origin: Origin = field(default_factory=Origin)
     solver_failures: int = 0
     simulation_failed: bool = False
@@ -148,7 +150,6 @@ class Trajectory:
             OSError: the file cannot be written.
         """
         said = {name: getattr(self, name) for name in KEPT_APART}
-        said |= {name: dataclasses.asdict(said[name]) for name in ("parameters", "origin")}
         said["environment"] = ENVIRONMENT
         write_parquet(path, FORMAT, self._table(), MEANINGS, said)
 
@@ -173,6 +174,7 @@ class Trajectory:
                 **{name: columns[name] for name in UNITS},
                 buttons=np.stack([columns[name] for name in Buttons._fields], axis=1),
                 parameters=CraneParameters.of(said["parameters"]),
+                task=None if said["task"] is None else Task(**said["task"]),
                 origin=Origin(**said["origin"]),
                 solver_failures=checks.whole("solver_failures", said["solver_failures"]),
                 simulation_failed=checks.flag("simulation_failed", said["simulation_failed"]),

@@ -6,6 +6,7 @@ all of it.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -36,7 +37,7 @@ def write_parquet(
         layout: format and version, as in "oilcrane-trajectory-3".
         columns: arrays of shape (N,).
         meanings: of each column, its metadata, such as its unit.
-        said: plain data that is no column.
+        said: plain data that is no column, or dataclasses of such.
 
     Raises:
         ImportError: pyarrow is missing; the message names the extra.
@@ -49,7 +50,9 @@ def write_parquet(
         pyarrow.field(name, values.type, nullable=False, metadata=meanings[name])
         for name, values in arrays.items()
     ]
-    metadata = {"format": layout} | {key: json.dumps(value) for key, value in said.items()}
+    metadata = {"format": layout} | {
+        key: json.dumps(value, default=dataclasses.asdict) for key, value in said.items()
+    }
     table = pyarrow.table(arrays, schema=pyarrow.schema(fields, metadata=metadata))
     with atomic_file(checks.path(path)) as partial:
         parquet.write_table(

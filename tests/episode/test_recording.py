@@ -72,10 +72,11 @@ def test_an_episode_of_any_operator_plays_again_from_its_file_bit_for_bit(
 ) -> None:
     path = tmp_path / "episode.parquet"
     cost = {"sway_weight": 0.1, "sway_term": "angle"}
-    recorded = record(path, operator=operator, parameters="field", cost=cost)
+    recorded = record(path, operator=operator, parameters="field", cost=cost, task="sequence")
     again = replay(path, make_controller("adaptive", parameters="field"))
     assert_same(recorded, again)
     assert again.origin.operator["name"] == f"recording:{path}"
+    assert again.task == recorded.task is not None
 
 
 @given(
