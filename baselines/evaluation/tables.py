@@ -39,7 +39,6 @@ MOTION = (
     Column("IAE", "IAE\n\\[m]", 1.0, 2),
     Column("stage_cost", "stage\ncost\n\\[m²/s]", 1.0, 2),
     Column("release_drift", "release\ndrift\n\\[m]", 1.0, 2),
-    Column("rest_overshoot", "rest over-\nshoot\n\\[m]", 1.0, 2),
     Column("settling_time", "settling\n\\[s]", 1.0, 1),
     Column("max_sway", "max\nsway\n\\[deg]", 180.0 / math.pi, 1),
 )
@@ -61,7 +60,7 @@ UNDEFINED = "-"
 def summary_table(results: Sequence[EpisodeResult]) -> Table:
     """One row a controller: what its episodes came to."""
     table = terminal_table("Controllers", summary_note(results))
-    table.add_column("controller")
+    table.add_column("controller", no_wrap=True)
     table.add_column("episodes", justify="right")
     for column in MOTION:
         table.add_column(column.head, justify="right")
@@ -88,7 +87,7 @@ def summary_note(results: Iterable[EpisodeResult]) -> str:
     unreleased = sum(math.isnan(metrics.release_drift) for metrics in played)
     without = (
         f" {unreleased} of {len(played)} episodes have no release, as a travel button was pressed "
-        "to the end or none was at all: they have no drift, overshoot or settling time."
+        "to the end or none was at all: they have no drift and no settling time."
         if unreleased
         else ""
     )
@@ -109,7 +108,7 @@ def operator_table(results: Sequence[EpisodeResult], index: str, title: str) -> 
         title: of the table, with the unit, in rich's markup.
     """
     values = index_values(results, index)
-    table = terminal_table(title, f"{WINNER} lowest of its row")
+    table = terminal_table(title, f"{WINNER} lowest of its row; {UNDEFINED} in no episode defined")
     table.add_column("operator")
     for controller in values:
         table.add_column(controller, justify="right")
@@ -133,6 +132,7 @@ def terminal_table(title: str, caption: str | None = None) -> Table:
         caption=caption,
         caption_justify="left",
         box=require("rich.box", extra="results").SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
     return table
 
