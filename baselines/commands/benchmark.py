@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import gymnasium
@@ -42,7 +42,7 @@ from baselines.commands.terminal import (
 from baselines.evaluation.comparison import compare
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.results import ResultsFolder, write_json
-from baselines.evaluation.workers import available_cores
+from baselines.evaluation.workers import Task, available_cores, perform
 from baselines.mpc.controller import PredictiveController
 from baselines.mpc.ipopt_form import WARM_BARRIER, IpoptNmpc
 from baselines.mpc.linear import LinearMpc
@@ -95,7 +95,10 @@ PROMISES = {
 
 
 def in_turns(
-    contestants: dict[str, Callable[[int], object]], count: int, block: int = 50
+    contestants: dict[str, Callable[[int], object]],
+    count: int,
+    block: int = 50,
+    clock: Callable[[], float] = perf_counter,
 ) -> dict[str, NDArray[np.float64]]:
     """Times every contestant on the same questions, a block at a time in turns.
 
@@ -105,6 +108,7 @@ def in_turns(
         contestants: name to what answers question k.
         count: number of questions.
         block: questions per turn.
+        clock: gives the time [s].
 
     Returns:
         Durations [s], shape (count,) each.
@@ -115,9 +119,9 @@ def in_turns(
     for start in range(0, count, block):
         for name, contestant in contestants.items():
             for k in range(start, min(start + block, count)):
-                begin = perf_counter()
+                begin = clock()
                 contestant(k)
-                durations[name][k] = perf_counter() - begin
+                durations[name][k] = clock() - begin
     return durations
 
 
@@ -313,78 +317,60 @@ def resident_memory() -> int:
     return int(status.read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-FEW, MANY = 10, 60
-"""Episodes of two evaluations, whose difference leaves out how the processes start."""
-
-TURNS_A_ROUND = 0.15
-"""A turn of the section "evaluate" takes so long that there are few."""
+STEADY = 10
+"""After so many episodes of an evaluation all its workers run."""
 
 
 def benchmark_evaluate(rounds: int) -> list[Timing]:
     """An episode of `adaptive` in an evaluation, kept on the disk, against it played bare.
 
-    Overhead is counted in processor time, of this process and its workers: on a busy machine the
-    wall clock tells of the others. That two workers are quicker than one only the wall clock tells.
-    """
-    specs = episode_specs(["adaptive"], ["random"], range(MANY), Setup())
-    env, controller = gymnasium.make("OILCrane-v0"), make_controller("adaptive")
-
-    def play_bare(count: int) -> None:
-        for k in range(count):
-            crane_env.run_episode(env, controller, seed=k)
-
-    play_bare(1)
-    evaluation_times(specs[:FEW], 1)  # the first one of a process imports more
-    processor: dict[str, list[float]] = {"run_episode": []}
-    wall: dict[str, list[float]] = {}
-    for _ in range(max(1, round(TURNS_A_ROUND * rounds))):
-        before = processor_time()
-        play_bare(MANY)
-        processor["run_episode"].append((processor_time() - before) / MANY)
-        for jobs in (1, 2):
-            few, _ = evaluation_times(specs[:FEW], jobs)
-            many, pace = evaluation_times(specs, jobs)
-            name = f"evaluate, jobs {jobs}"
-            processor.setdefault(name, []).append((many - few) / (MANY - FEW))
-            wall.setdefault(f"{name}, wall clock", []).append(pace)
-    allowed = {"evaluate, jobs 1": "<= 1.05", "evaluate, jobs 2, wall clock": "<= 1/1.8"}
-    return [
-        *timings(
-            {name: np.array(times) for name, times in processor.items()}, "run_episode", allowed
-        ),
-        *timings(
-            {name: np.array(times) for name, times in wall.items()},
-            "evaluate, jobs 1, wall clock",
-            allowed,
-        ),
-    ]
-
-
-def evaluation_times(specs: Sequence[EpisodeSpec], jobs: int) -> tuple[float, float]:
-    """Processor time of an evaluation, and time between two episodes when all workers run [s].
+    What an evaluation adds is counted in processor time, episode by episode in turns: on a busy
+    machine the wall clock tells of its other users. That two workers are quicker than one only the
+    wall clock tells.
 
     Raises:
         FailedError: an episode failed, as all do when the code is edited meanwhile.
     """
-    ends: list[float] = []
-    before = processor_time()
-    with tempfile.TemporaryDirectory() as folder:
-        results = compare(
-            specs,
-            ResultsFolder(Path(folder)),
-            jobs=jobs,
-            on_result=lambda _: ends.append(perf_counter()),
+    specs = episode_specs(["adaptive"], ["random"], range(2 * rounds + STEADY), Setup())
+    env, controller = gymnasium.make("OILCrane-v0"), make_controller("adaptive")
+    with tempfile.TemporaryDirectory() as name:
+        folder = ResultsFolder(Path(name))
+        folder.prepare()
+        tasks = [Task(spec, spec.key, folder.path, "trajectories") for spec in specs]
+        processor = in_turns(
+            {
+                "run_episode": lambda k: crane_env.run_episode(env, controller, seed=k),
+                "an episode of evaluate": lambda k: perform(tasks[k]),
+            },
+            len(specs),
+            block=1,
+            clock=process_time,
         )
+    wall = {f"evaluate, jobs {jobs}": evaluation_pace(specs, jobs) for jobs in (1, 2)}
+    bare, kept = timings(processor, "run_episode", {"an episode of evaluate": "<= 1.05"})
+    paired = np.median(processor[kept.name] / processor[bare.name])  # each pair in the same weather
+    return [
+        bare,
+        replace(kept, ratio=float(paired)),
+        *timings(wall, "evaluate, jobs 1", {"evaluate, jobs 2": "<= 1/1.8"}),
+    ]
+
+
+def evaluation_pace(specs: Sequence[EpisodeSpec], jobs: int) -> NDArray[np.float64]:
+    """Time from one episode to the next but one, halved, once all workers run [s].
+
+    Raises:
+        FailedError: an episode failed.
+    """
+    ends: list[float] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = ResultsFolder(Path(name))
+        results = compare(specs, folder, jobs=jobs, on_result=lambda _: ends.append(perf_counter()))
     if failures := failure_lines(results):
         raise FailedError(*failures)
-    steady = ends[FEW // 2 :]
-    return processor_time() - before, (steady[-1] - steady[0]) / (len(steady) - 1)
-
-
-def processor_time() -> float:
-    """Of this process and of its children that have ended [s]."""
-    times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    steady = np.array(ends[STEADY:])
+    pace: NDArray[np.float64] = (steady[2:] - steady[:-2]) / 2.0
+    return pace
 
 
 VECTOR_SIZE = 1024

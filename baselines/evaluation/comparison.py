@@ -201,6 +201,6 @@ def _episodes(
         "controllers": list(dict.fromkeys(spec.controller for spec in specs)),
         "operators": list({spec.operator_name: spec.operator for spec in specs}.values()),
         "seeds": list(dict.fromkeys(spec.seed for spec in specs)),
-        "setups": {spec.setup.key: dataclasses.asdict(spec.setup) for spec in specs},
+        "setups": {spec.setup.key: spec.setup.data for spec in specs},
         "episodes": episodes,
     }

@@ -69,7 +69,12 @@ class Setup:
     @functools.cached_property
     def key(self) -> str:
         """Digest of the setup and the code, 12 hexadecimal digits."""
-        return digest([dataclasses.asdict(self), code_identity()])[:12]
+        return digest([self.data, code_identity()])[:12]
+
+    @functools.cached_property
+    def data(self) -> dict[str, Any]:
+        """The setup as plain data, made once: not to be changed."""
+        return dataclasses.asdict(self)
 
     @classmethod
     def of(cls, mapping: Mapping[str, Any]) -> Setup:
@@ -132,6 +137,12 @@ class EpisodeSpec:
         if None in read:
             return None
         return digest(read) if read else ""
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The specification as plain data: not to be changed."""
+        own = {name: getattr(self, name) for name in ("controller", "operator", "seed")}
+        return {**own, "setup": self.setup.data}
 
     @classmethod
     def of(cls, mapping: Mapping[str, Any]) -> EpisodeSpec:

@@ -147,7 +147,7 @@ class ResultsFolder:
         """
         metrics = trajectory.metrics()
         record: dict[str, Any] = {
-            "spec": dataclasses.asdict(spec),
+            "spec": spec.data,
             "metrics": _nan_to_none(metrics.as_dict()),
             "wall_time": wall_time,
             "read": read,

@@ -73,7 +73,7 @@ def motion_indices(result: EpisodeResult) -> dict[str, float]:
 
 
 def test_one_process_two_processes_and_this_one_play_the_same_episodes(tmp_path: Path) -> None:
-    specs = specs_of("manual", "linear", operators=("table1:1", "random"), seeds=2)
+    specs = specs_of("manual", "linear", operators=("table1:1", "manoeuvre"), seeds=2)
     one, two = ResultsFolder(tmp_path / "one"), ResultsFolder(tmp_path / "two")
     alone = compare(specs, one, jobs=1)
     shared = compare(specs[::-1], two, jobs=2)[::-1]
@@ -82,7 +82,7 @@ def test_one_process_two_processes_and_this_one_play_the_same_episodes(tmp_path:
         assert same_motion(one.trajectory(spec), two.trajectory(spec))
         assert same_motion(one.trajectory(spec), play(spec))
         np.testing.assert_equal(motion_indices(first), motion_indices(second))
-    seeds = [one.trajectory(spec) for spec in specs if spec.operator_name == "random"][:2]
+    seeds = [one.trajectory(spec) for spec in specs if spec.operator_name == "manoeuvre"][:2]
     assert not np.array_equal(seeds[0].travel_reference, seeds[1].travel_reference)
 
 
