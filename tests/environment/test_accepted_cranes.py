@@ -16,7 +16,7 @@ from crane_env.parameters import CraneParameters
 from crane_env.plant.single import Plant
 from tests.plant.accepted_cranes import accepted_crane
 
-OPERATORS = ("random", "manoeuvre", "table1:3")
+OPERATORS = ("stress", "manoeuvre", "table1:3")
 
 
 @st.composite

@@ -26,7 +26,7 @@ from crane_env.operators.base import RELEASED
 from crane_env.operators.manoeuvre import RandomManoeuvre
 from crane_env.rendering.canvas import SMALLEST_PICTURE
 
-OPERATORS = ["random", "manoeuvre", "table1:3", "random", "random", "manoeuvre"]
+OPERATORS = ["stress", "manoeuvre", "table1:3", "stress", "stress", "manoeuvre"]
 COUNT = len(OPERATORS)
 MODES = list(AutoresetMode)
 RANGES = Randomisation(

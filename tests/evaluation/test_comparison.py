@@ -163,7 +163,7 @@ def test_a_setup_and_a_specification_survive_json_with_their_keys() -> None:
         settings=MpcSettings(acceleration_limits=(-0.2, 0.3), control_horizon=5),
         max_steps=7,
     )
-    for spec in episode_specs(["linear"], ["random", "table1:2", "manoeuvre"], [3], setup):
+    for spec in episode_specs(["linear"], ["stress", "table1:2", "manoeuvre"], [3], setup):
         again = EpisodeSpec.of(json.loads(json.dumps(dataclasses.asdict(spec))))
         assert again == spec
         assert again.key == spec.key
@@ -316,7 +316,7 @@ def test_a_damaged_or_incomplete_episode_is_played_again(tmp_path: Path) -> None
 
 
 def test_what_a_worker_uses_again_plays_as_if_it_were_new() -> None:
-    specs = specs_of("adaptive", "nmpc-b-rti", operators=("random", "table1:1"))
+    specs = specs_of("adaptive", "nmpc-b-rti", operators=("stress", "table1:1"))
     used = [play(spec) for spec in [*specs, *specs[::-1]]][len(specs) :]
     for spec, trajectory in zip(specs[::-1], used, strict=True):
         baselines.evaluation.episode_spec._environment.cache_clear()
