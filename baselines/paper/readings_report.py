@@ -95,7 +95,8 @@ def _again_part(reproduction: Reproduction, screening: Screening) -> list[str]:
         "and the table: the best of the paper's own horizons, the best of the walks, the three "
         "sway states on the defaults, and some of the walks at random. The best, of "
         f"{COUNTED} counted claims, with that about time taken from the defaults (IAE: mean over "
-        "Table I [m]; swing: mean of the hoisted travel [mm/s]):",
+        "Table I [m]; swing: mean of the hoisted travel [mm/s]). Claims alone do not make a "
+        "reading plausible; nobody would run a crane at some of these.",
         markdown_table(
             (
                 "reading",

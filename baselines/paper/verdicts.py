@@ -21,7 +21,7 @@ from baselines.paper.checks import Finding
 from baselines.paper.claims import CLAIMS, Claim
 from baselines.paper.design import CONFIDENCE, Screening, Turn
 from baselines.paper.evidence import Evidence
-from baselines.paper.readings import Reading
+from baselines.paper.readings import POINTS, Reading
 
 PAIRS = (
     ("linear", "adaptive"),
@@ -59,24 +59,44 @@ class Judgement:
         default: finding on the default setup.
         turns: how often each open point turns it; none if it was not screened.
         screened: whether it holds in each reading that was screened.
-        crane: whether it holds in each reading that was played on the MuJoCo crane.
+        crane: readings that were played on the MuJoCo crane, and whether it holds.
     """
 
     claim: Claim
     default: Finding
     turns: tuple[Turn, ...] = ()
     screened: tuple[bool, ...] = ()
-    crane: tuple[bool, ...] = ()
+    crane: tuple[tuple[Reading, bool], ...] = ()
 
     @property
     def verdict(self) -> Verdict:
         """In a word; "reproduced" says that no reading tried turns it, of those that could."""
-        tried = (*self.screened, *self.crane)
+        tried = self.tried
         if self.claim.fixed or not tried:
             return "not varied"
         if any(holds != self.default.holds for holds in tried):
             return "depends"
         return "reproduced" if self.default.holds else "not reproduced"
+
+    @property
+    def tried(self) -> tuple[bool, ...]:
+        """Whether it holds in each reading that was tried, screened or played."""
+        return (*self.screened, *(holds for _, holds in self.crane))
+
+    @property
+    def separated_by(self) -> tuple[str, ...]:
+        """Points whose levels in the played readings that turn it are no other's."""
+        if self.verdict != "depends":
+            return ()
+
+        def levels(point: str, default: bool) -> set[Any]:
+            return {
+                getattr(reading, point)
+                for reading, holds in self.crane
+                if (holds == self.default.holds) == default
+            }
+
+        return tuple(p for p in POINTS if not levels(p, default=False) & levels(p, default=True))
 
     @property
     def depends_on(self) -> tuple[Turn, ...]:
@@ -100,7 +120,7 @@ class Judgement:
                 for t in self.turns
             },
             "screened": {"holds": sum(self.screened), "of": len(self.screened)},
-            "on_the_crane": {"holds": sum(self.crane), "of": len(self.crane)},
+            "on_the_crane": {"holds": sum(h for _, h in self.crane), "of": len(self.crane)},
         }
 
 
@@ -125,8 +145,8 @@ def judge(
         if claim.screened and screening:
             turns = screening.turns(claim.name)
             screened = tuple(o.holds[claim.name] for o in screening.outcomes.values())
-        crane = () if claim.timed else tuple(claim.check(e).holds for _, e in again)
-        judgements.append(Judgement(claim, claim.check(default), turns, screened, crane))
+        played = () if claim.timed else tuple((r, claim.check(e).holds) for r, e in again)
+        judgements.append(Judgement(claim, claim.check(default), turns, screened, played))
     return tuple(judgements)
 
 

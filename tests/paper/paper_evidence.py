@@ -30,6 +30,7 @@ OTHERS = {
     "max_sway": 0.08,
     "peak_acceleration": 2.5,
     "rest_overshoot": 0.1,
+    "stage_cost": 3.0,
     "error_after_release": 1.6,
 }
 TIMES = {"adaptive": 2e-5, "nmpc-a": 2e-4, "nmpc-b": 3e-4}

@@ -120,6 +120,9 @@ def test_a_failed_episode_is_no_evidence(tmp_path: Path) -> None:
 # Verdicts
 
 
+ZERO = Reading(tail="zero")
+
+
 def judgement(default: bool, *tried: bool, turned: tuple[int, ...] = ()) -> Judgement:
     points = ("tail", "cost_term", "sway_state")
     turns = tuple(Turn(p, n, 100) for p, n in zip(points, turned, strict=False))
@@ -134,7 +137,11 @@ def judgement(default: bool, *tried: bool, turned: tuple[int, ...] = ()) -> Judg
         (judgement(False, False), "not reproduced", []),
         (judgement(True, True, False, turned=(5, 12, 40)), "depends", ["sway_state", "cost_term"]),
         (judgement(False, True, turned=(3, 0, 2)), "depends", ["tail"]),
-        (dataclasses.replace(judgement(True), crane=(True, False)), "depends", []),
+        (
+            dataclasses.replace(judgement(True), crane=((DEFAULT, True), (ZERO, False))),
+            "depends",
+            [],
+        ),
         (
             dataclasses.replace(judgement(True, True), claim=BY_NAME["acceleration-limit"]),
             "not varied",
@@ -147,6 +154,12 @@ def test_a_verdict_names_the_points_that_turn_it_and_never_says_more_than_was_va
 ) -> None:
     assert found.verdict == verdict
     assert [turn.point for turn in found.depends_on] == depends_on
+
+
+def test_what_was_played_but_not_screened_names_what_sets_its_readings_apart() -> None:
+    both = dataclasses.replace(ZERO, control_horizon=20)
+    played = ((DEFAULT, True), (both, False), (Reading(control_horizon=20), True), (ZERO, False))
+    assert dataclasses.replace(judgement(True), crane=played).separated_by == ("tail",)
 
 
 def test_without_timing_there_is_no_claim_about_time() -> None:
@@ -172,7 +185,7 @@ def test_shares_count_the_manoeuvres_that_meet_a_claim() -> None:
 
 @pytest.fixture(scope="module")
 def reproduced() -> Reproduction:
-    other = Reading(tail="zero")
+    other = ZERO
     turned = dataclasses.replace(scaled(AGREEING, "linear", "IAE", 0.5), setup=other.setup)
     walk: tuple[Outcome, ...] = (outcome(DEFAULT, AGREEING), outcome(other, turned))
     again = ((DEFAULT, AGREEING), (other, turned))
@@ -196,7 +209,7 @@ def test_the_report_names_what_turns_a_claim_and_what_was_not_varied(
 ) -> None:
     lines = markdown_report(reproduced).splitlines()
     (iae,) = (line for line in lines if "its IAE always exceeds" in line)
-    assert "**depends** on tail; holds in 50 % of 2 readings" in iae
+    assert "**depends** on tail (100 %); holds in 50 % of 2 readings" in iae
     (limit,) = (line for line in lines if "The constraint of" in line)
     assert "**not varied**: the limit is a constraint" in limit
 
