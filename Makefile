@@ -6,7 +6,7 @@ RUN := $(VENV)/bin/python
 PIP := $(RUN) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help evaluate reproduce test proofs check benchmark docs clean
+.PHONY: help evaluate reproduce play test proofs check benchmark docs clean
 
 help:  ## Lists the commands.
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -16,6 +16,9 @@ evaluate: $(VENV)/run.stamp  ## Drives the ten manoeuvres of Table I; results in
 
 reproduce: $(VENV)/run.stamp  ## Puts the paper to the test; verdicts and report in results/paper.
 	$(RUN) scripts/reproduce_paper.py $(ARGS)
+
+play: $(VENV)/run.stamp  ## Opens the crane in a browser, to be driven by hand.
+	$(RUN) scripts/play.py $(ARGS)
 
 test: $(VENV)/dev.stamp check  ## Runs the linters and the tests, or some: ARGS=tests/plant.
 	$(RUN) -m pytest -n auto -m "not slow" $(ARGS)
@@ -45,7 +48,7 @@ $(VENV)/bin/activate:
 	$(PYTHON) -m venv --clear $(VENV)
 
 $(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/activate
-	$(PIP) --editable '.[mpc,results,policies]'
+	$(PIP) --editable '.[mpc,results,policies,play]'
 	@touch $@
 
 $(VENV)/dev.stamp: pyproject.toml | $(VENV)/bin/activate

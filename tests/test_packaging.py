@@ -58,7 +58,8 @@ def test_the_wheel_carries_model_policies_and_type_markers(wheel: Path) -> None:
         path.relative_to(ROOT).as_posix()
         for package in ("crane_env", "baselines")
         for path in (ROOT / package).rglob("*")
-        if path.suffix in (".py", ".typed", ".xml", ".onnx", ".json")
+        if path.suffix
+        in (".py", ".typed", ".xml", ".onnx", ".json", ".html", ".css", ".js", ".svg")
     }
     assert packed <= names
     assert not any(name.startswith(("tests", "scripts", "docs")) for name in names)

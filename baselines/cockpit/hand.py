@@ -24,11 +24,13 @@ class Hand:
     Attributes:
         buttons: what the person holds now.
         operator: who presses instead; None: the person does.
+        stage: number of the goal that counts, if there is a task.
     """
 
     def __init__(self) -> None:
         self.buttons = RELEASED
         self.operator: Operator | None = None
+        self.stage = 0
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Hand:
         """There is only one person: the environment's copy is the hand itself."""
@@ -57,6 +59,7 @@ class Hand:
 
     def pursue(self, task: Any, stage: int) -> None:
         """Turns to a goal; see `crane_env.tasks.task.Pursuer.pursue`."""
+        self.stage = stage
         operator: Any = self.operator
         if hasattr(operator, "pursue"):
             operator.pursue(task, stage)

@@ -12,10 +12,10 @@ import signal
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
-from baselines.cockpit.lineup import CANDIDATES, build_lineup
+from baselines.cockpit.lineup import build_lineup
 from baselines.cockpit.messages import Hold, Message, Seen
 from baselines.cockpit.pace import Pace, go_first
-from baselines.cockpit.session import OPERATORS, Opening, Session
+from baselines.cockpit.session import BRAKE, OPERATORS, TASKS, Opening, Session
 
 CREDIT = 25
 """States that may be on their way to the server: half a second of them."""
@@ -56,9 +56,10 @@ def control(connection: Connection, opening: Opening) -> None:
             which it tells `Hello`s, then `State`s and `Saved`s.
         opening: how the session begins.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which closes
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)  # they reach the parent too, which closes
     try:
-        names = dict.fromkeys((*CANDIDATES, opening.controller))
+        names = dict.fromkeys((BRAKE, *opening.controllers, opening.controller))
         crane = opening.parameters
         lineup = build_lineup(names, crane, lambda name: connection.send(Hello(building=name)))
         if opening.controller in lineup.left_out:
@@ -68,6 +69,7 @@ def control(connection: Connection, opening: Opening) -> None:
             "controllers": list(session.controllers),
             "left_out": lineup.left_out,
             "operators": list(OPERATORS),
+            "tasks": list(TASKS),
             "first": go_first(),
             "period": crane.control_period,
             "rail": crane.rail_half_length,

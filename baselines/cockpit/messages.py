@@ -24,7 +24,7 @@ from crane_env.support.checks import shown
 LONGEST = 256
 """Longest message [bytes]."""
 
-ACTIONS = ("resume", "reset", "replay", "bump", "gust", "save")
+ACTIONS = ("resume", "reset", "again", "replay", "bump", "gust", "save")
 """What the holder of the pendant may have done at once."""
 
 CHOICES = ("controller", "operator", "task")

@@ -16,14 +16,15 @@ from typing import Any
 from baselines.cockpit.dead_man import DeadMan
 from baselines.cockpit.drive import Again, Drive, Driver
 from baselines.cockpit.hand import YOU, Hand
-from baselines.cockpit.lineup import Lineup
+from baselines.cockpit.lineup import CANDIDATES, Lineup
 from baselines.cockpit.messages import Choose, Do, Hold, Leave, Message, Stop, Take
 from baselines.cockpit.rest_point import RestPoint
 from crane_env.environment.single import OILCraneEnv
 from crane_env.observation import Observation
-from crane_env.operators.base import RELEASED
+from crane_env.operators.base import RELEASED, Buttons
 from crane_env.parameters import CraneParameters
 from crane_env.support.checks import choice
+from crane_env.tasks.drawn import FAMILIES
 
 BRAKE = "manual"
 """Controller that an emergency stop leaves the drive to: its ramp down to rest."""
@@ -50,6 +51,15 @@ OPERATORS = (
 NO_TASK = "none"
 """Name of driving as one likes."""
 
+TASKS = (NO_TASK, *FAMILIES)
+"""Tasks that the page offers."""
+
+FIRST_TASK = "position"
+"""What a person does who is to drive without a task."""
+
+COLLISION = 10.0
+"""What a collision adds to the score of a task [s]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Opening:
@@ -57,15 +67,55 @@ class Opening:
 
     Attributes:
         parameters: the crane.
-        controller: who drives the trolley first.
+        controllers: who may drive the trolley, by name.
+        controller: who drives it first.
         operator: who presses first; see `OPERATORS`, or any other name of `make_operator`.
+        task: what is to be done first, one of `TASKS`.
         seed: of the first episode; each reset takes the next one.
     """
 
     parameters: CraneParameters = field(default_factory=CraneParameters)
+    controllers: tuple[str, ...] = CANDIDATES
     controller: str = "ltv"
     operator: str = YOU
+    task: str = NO_TASK
     seed: int = 1
+
+
+class Attempt:
+    """How somebody fares in an episode: the clock, from the first press on, presses, collisions."""
+
+    def __init__(self) -> None:
+        self._presses = self._collisions = 0
+        self._begun: float | None = None
+        self._done: float | None = None
+        self._touching = False
+
+    def watch(self, time: float, before: Buttons, now: Buttons, info: dict[str, Any]) -> None:
+        """Looks at a control step that ends at `time` [s]."""
+        new = sum(pressed and not held for held, pressed in zip(before, now, strict=True))
+        if new and self._begun is None:
+            self._begun = time
+        if self._done is not None:
+            return
+        self._presses += new
+        touching = bool(info.get("collision_speed", 0.0))
+        self._collisions += touching and not self._touching
+        self._touching = touching
+        if info["task_success"]:
+            self._done = time
+
+    def tell(self, time: float) -> dict[str, Any]:
+        """What the page is told at `time` [s]."""
+        end = time if self._done is None else self._done
+        clock = 0.0 if self._begun is None else end - self._begun
+        return {
+            "clock": round(clock, 2),
+            "presses": self._presses,
+            "collisions": self._collisions,
+            "score": round(clock + COLLISION * self._collisions, 2),
+            "done": self._done is not None,
+        }
 
 
 class Session:
@@ -92,12 +142,12 @@ class Session:
         self._seed = opening.seed - 1
         self._stopped = False
         self._stopped_from = opening.controller
-        self._operator = opening.operator
+        self._operator, self._task = opening.operator, opening.task
+        self._attempt = Attempt()
         self._saved: tuple[int, str] = (0, "")
         self._replayed: bool | None = None
         self._gust: deque[float] = deque()
         self._struck = False
-        self._presses = 0
         self._acceleration = self._answer_time = self._where = 0.0
         self._begin(opening.operator)
 
@@ -145,9 +195,8 @@ class Session:
         observation, _, _, failed, info = self._env.step(self._action)
         if failed:
             self._begin(YOU)
-            return self._tell(now)
-        changes = zip(before, self._env.buttons, strict=True)
-        self._presses += sum(new and not old for old, new in changes)
+            return self._tell()
+        self._attempt.watch(self._env.time, before, self._env.buttons, info)
         disturbed = bool(info["drive_limited"]) or bool(self._gust) or self._struck
         self._struck = False
         if self._gust:
@@ -163,7 +212,7 @@ class Session:
             helped=self._driver.chosen != BRAKE,
             disturbed=disturbed or chosen != self._driver.chosen,
         )
-        return self._tell(now)
+        return self._tell()
 
     def _act(self, observation: Any) -> None:
         start = perf_counter()
@@ -180,17 +229,23 @@ class Session:
         self._operator = operator
         if past is not None:
             self._hand.operator = Again(past)
+        elif self._task == NO_TASK and getattr(self._hand.operator, "needs_task", False):
+            self._task = FIRST_TASK
         self._seed = self._seed + 1 if past is None else past.seed
         self._driver.follow(past)
         self._gust.clear()
         self._replayed, self._struck = None, True
-        self._presses, self._acceleration = 0, 0.0
+        self._attempt, self._acceleration = Attempt(), 0.0
         self._dead_man.trip()
         self._hand.buttons = RELEASED
-        observation, _ = self._env.reset(seed=self._seed, options={"operator": self._hand})
+        options = {"operator": self._hand, "task": self._drawn()}
+        observation, _ = self._env.reset(seed=self._seed, options=options)
         self._driver.reset()
         self._act(observation)
         self._where = self._env.truth().trolley_position
+
+    def _drawn(self) -> str | None:
+        return None if self._task == NO_TASK else self._task
 
     def _end_replay(self) -> None:
         if self._driver.following is not None:
@@ -214,13 +269,19 @@ class Session:
                 self._driver.choose(self._stopped_from)
             case "reset":
                 self._begin(self._presser())
+            case "again":
+                self._seed -= 1
+                self._begin(self._presser())
             case "replay":
-                self._begin(YOU, self._driver.drive(self._seed, None))
+                self._begin(YOU, self._driver.drive(self._seed, self._drawn()))
             case "bump" | "gust" if abs(self._env.truth().sway_angle) < WIDEST_SWING:
                 self._end_replay()
                 self._strike(action)
             case "save":
-                self._saved = (self._saved[0] + 1, self._driver.drive(self._seed, None).to_json())
+                self._saved = (
+                    self._saved[0] + 1,
+                    self._driver.drive(self._seed, self._drawn()).to_json(),
+                )
 
     def _strike(self, action: str) -> None:
         if action == "bump":
@@ -238,22 +299,31 @@ class Session:
             self._driver.choose(name)
         elif what == "operator" and name in OPERATORS:
             self._begin(name)
+        elif what == "task" and name in TASKS:
+            self._task = name
+            self._begin(self._presser())
 
     def _presser(self) -> str:
         """Who presses now, as far as it is somebody of `OPERATORS`."""
         nobody_else = self._hand.operator is None or self._driver.following is not None
         return YOU if nobody_else else self._operator
 
-    def _tell(self, now: float) -> dict[str, Any]:
+    def _tell(self) -> dict[str, Any]:
         truth, env = self._env.truth(), self._env
         past = self._driver.following
+        goals, walls = (env.task.goals, env.task.obstacles) if env.task else ((), ())
         return {
+            "type": "state",
             "time": round(env.time, 3),
             "crane": [round(value, 5) for value in truth],
             "acceleration": round(self._acceleration, 4),
             "rest": round(self._where, 3),
             "buttons": list(env.buttons),
-            "presses": self._presses,
+            "task": self._task,
+            "goals": [[goal.position, goal.depth, goal.tolerance] for goal in goals],
+            "walls": [[wall.left, wall.right, wall.top] for wall in walls],
+            "stage": self._hand.stage,
+            **self._attempt.tell(env.time),
             "controller": self._driver.chosen,
             "answer": round(1000.0 * self._answer_time, 3),
             "operator": self._presser(),

@@ -38,6 +38,7 @@ COMMANDS = {
         "evaluate", "mpc,results", "drives controllers through manoeuvres and compares them"
     ),
     "reproduce": Command("reproduce", "mpc,results", "puts the paper to the test"),
+    "play": Command("play", "mpc,results,play", "opens the crane in a browser, driven by hand"),
     "train": Command("train", "results,rl", "trains a reinforcement learner, or exports one"),
     "compare-learners": Command(
         "compare_learners", "mpc,policies,results", "compares reinforcement learning with the MPCs"

@@ -13,7 +13,7 @@ from baselines.cockpit.dead_man import LONGEST_HOLD
 from baselines.cockpit.drive import Drive
 from baselines.cockpit.lineup import Lineup, build_lineup
 from baselines.cockpit.messages import ACTIONS, CHOICES, Choose, Do, Hold, Message, Stop, Take, read
-from baselines.cockpit.session import OPERATORS, Opening, Session
+from baselines.cockpit.session import OPERATORS, TASKS, Opening, Session
 from crane_env.operators.base import RELEASED, Buttons
 from crane_env.parameters import CraneParameters
 
@@ -165,6 +165,33 @@ def test_where_the_payload_will_rest_is_told_before_it_does(lineup: Lineup) -> N
         assert page.hold(RELEASED, 700)["crane"][0] == pytest.approx(told, abs=allowed)
 
 
+@pytest.mark.parametrize("task", TASKS[1:])
+def test_every_task_that_is_offered_can_be_begun(lineup: Lineup, task: str) -> None:
+    page = Page(lineup)
+    page.say(Choose("", "task", task))
+    state = page.hold(RELEASED, 2)
+    assert state["task"] == task
+    assert len(state["goals"]) >= 1
+    assert state["clock"] == 0.0
+
+
+def test_the_clock_of_a_task_runs_from_the_first_press_until_it_is_done(lineup: Lineup) -> None:
+    page = Page(lineup, "lqr")
+    page.say(Choose("", "task", "position"), Choose("", "operator", "person:expert"))
+    for _ in range(2500):
+        state = page.hold(RELEASED, 1)
+        if state["done"]:
+            break
+    assert state["done"]
+    assert 0.0 < state["score"] < state["time"]
+    assert abs(page.session.truth.trolley_position - state["goals"][0][0]) < 0.1
+    assert page.hold(RELEASED, 50)["clock"] == state["clock"]
+    page.say(Do("", "again"))
+    assert page.hold(RELEASED, 1)["goals"] == state["goals"]
+    page.say(Do("", "reset"))
+    assert page.hold(RELEASED, 1)["goals"] != state["goals"]
+
+
 ticks = st.integers(0, 60) | st.integers(0, 2**53 - 1)
 buttons = st.lists(st.booleans(), min_size=4, max_size=4)
 token = st.just("")
@@ -174,7 +201,7 @@ holds = st.fixed_dictionaries(
 deeds = st.fixed_dictionaries(
     {"type": st.just("do"), "token": token, "action": st.sampled_from(ACTIONS)}
 )
-names = st.sampled_from(["manual", "lqr", "adaptive", *OPERATORS[:4], "", "nobody"])
+names = st.sampled_from(["manual", "lqr", "adaptive", *OPERATORS[:4], *TASKS, "", "nobody"])
 choices = st.fixed_dictionaries(
     {"type": st.just("choose"), "token": token, "what": st.sampled_from(CHOICES), "name": names}
 )
