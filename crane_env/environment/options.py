@@ -16,9 +16,6 @@ from crane_env.plant.start import Start
 from crane_env.support import checks
 from crane_env.support.checks import choice, real, shown
 
-TASK_STREAM = 2
-"""Beside an episode's number, the seed of its task."""
-
 
 def start_of(options: Mapping[str, Any], operator: Operator, parameters: CraneParameters) -> Start:
     """Where options of numbers let a crane begin; else where its operator's recording did.

@@ -41,7 +41,7 @@ class StepRecord(NamedTuple):
 def report_start(state: CraneState, cable_tension: Any) -> dict[str, Any]:
     """Info of cranes that have just been placed and have done nothing."""
     nothing, no = 0.0 * cable_tension, cable_tension < 0.0
-    still = Outcome(state, cable_tension, nothing, no, no)
+    still = Outcome(state, cable_tension, nothing, no, nothing, no)
     return _info(still, _payload_velocity(state), nothing, nothing, nothing, no, no)
 
 
@@ -98,7 +98,7 @@ def _info(
     to arrays of bool, but NumPy's scalars to arrays of objects.
     """
     number, flag = np.float64, np.array
-    state, tension, acceleration, limited, failed = outcome
+    state, tension, acceleration, limited, collision_speed, failed = outcome
     return {
         "payload_position": number(payload_position(state[0], state[2], state[4])),
         "payload_velocity": number(velocity),
@@ -108,6 +108,7 @@ def _info(
         "drive_limited": flag(limited),
         "simulation_failed": flag(failed),
         "task_success": flag(success),
+        "collision_speed": number(collision_speed),
         "reward_tracking": number(tracking),
         "reward_sway": number(sway),
         "reward_acceleration": number(effort),

@@ -11,12 +11,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from crane_env.environment.options import (
-    TASK_STREAM,
-    accelerations,
-    read_options,
-    start_of,
-)
+from crane_env.environment.options import accelerations, read_options, start_of
 from crane_env.environment.pictures import Pictures
 from crane_env.environment.report import StepRecord, report_period, report_start
 from crane_env.observation import CraneState, Observation, observation_space
@@ -28,7 +23,7 @@ from crane_env.stage_cost import StageCost
 from crane_env.support import checks
 from crane_env.support.fixed import fixed
 from crane_env.tasks.judge import TaskJudge
-from crane_env.tasks.registry import TaskSpec, check_task, make_task, task_of_episode
+from crane_env.tasks.registry import TaskSpec, check_task, draw_task, make_task
 from crane_env.tasks.task import Task, check_has_task, set_upon
 
 if TYPE_CHECKING:
@@ -97,6 +92,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     | drive_limited       | -      | speed limit or limit switch overruled the action   | False    |
     | simulation_failed   | -      | the simulation diverged, see below                 | False    |
     | task_success        | -      | the payload has been brought to the task's goals   | False    |
+    | collision_speed     | m/s    | at which it met an obstacle, across its face, or 0 | 0        |
     | reward_tracking ... | m^2/s  | the three terms of the reward                      | 0        |
 
     ## Starting state
@@ -236,23 +232,23 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         if "task" in placed:
             given = make_task(placed.pop("task"))
         check_has_task(operator, given)
-        start = start_of(placed, operator, self._parameters)
-        check_task(given, self._parameters, start.coordinates(self._parameters).state)
+        parameters = self._parameters
+        start = start_of(placed, operator, parameters)
+        state = start.coordinates(parameters).state
+        check_task(given, parameters, state)
         super().reset(seed=None if seed is None else checks.seed(seed))
-        self._plant.reset(start)
-        self._operator = operator
-        self._step_index = 0
-        state, tension = self._plant.measure()
         # Operator and task draw from generators of their own: how far one episode was played does
         # not change the next.
         number = int(self.np_random.integers(2**63))
-        self._operator.reset(np.random.default_rng(number), state, self._parameters)
-        self._due, self._judge = -math.inf, None
-        if given is not None:
-            stream = np.random.default_rng((number, TASK_STREAM))
-            task = task_of_episode(given, stream, self._parameters, state)
-            assert task is not None, "a task was given"
-            self._judge = TaskJudge(task, self._parameters.control_period)
+        task = draw_task(given, number, parameters, state)
+        self._plant.reset(start, () if task is None else task.obstacles)
+        state, tension = self._plant.measure()
+        self._step_index, self._due = 0, -math.inf
+        self._operator = operator
+        self._operator.reset(np.random.default_rng(number), state, parameters)
+        self._judge = None
+        if task is not None:
+            self._judge = TaskJudge(task, parameters.control_period)
             set_upon(self._operator, task, 0)
         self._read_buttons(state)
         info = report_start(state, tension)

@@ -14,7 +14,6 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from crane_env.environment.options import (
-    TASK_STREAM,
     accelerations,
     chosen_by,
     read_options,
@@ -41,7 +40,7 @@ from crane_env.support.checks import choice, whole
 from crane_env.support.fixed import fixed
 from crane_env.tasks.drawn import DrawnTasks
 from crane_env.tasks.judge import TaskJudge, VectorJudge
-from crane_env.tasks.registry import VectorTaskSpec, check_task, make_tasks, task_of_episode
+from crane_env.tasks.registry import VectorTaskSpec, check_task, draw_task, make_tasks
 from crane_env.tasks.task import Task, check_has_task
 
 if TYPE_CHECKING:
@@ -394,9 +393,9 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         starts: Sequence[Start],
     ) -> None:
         """Begins an episode of each of some cranes, where its start says."""
-        cranes, numbers = [], []
+        cranes, numbers, tasks = [], [], []
         randomised = bool(self._randomisation.ranges)
-        for index in indices.tolist():
+        for index, start in zip(indices.tolist(), starts, strict=True):
             # One number an episode, as `OILCraneEnv` draws it; all else is drawn from others that
             # it seeds.
             number = int(self._random(index)[0].integers(2**63))
@@ -405,19 +404,20 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             if randomised:
                 crane = self._randomisation.draw(np.random.default_rng((number, 1)), crane)
             cranes.append(crane)
-        self._plant.exchange(indices, cranes)
-        self._plant.reset(indices, starts)
-        states = self._plant.states()
-        for index, crane, number in zip(indices.tolist(), cranes, numbers, strict=True):
-            start = CraneState(*states[index].tolist())
             task = None
             if given[index] is not None:
-                stream = np.random.default_rng((number, TASK_STREAM))
-                task = task_of_episode(given[index], stream, crane, start)
+                task = draw_task(given[index], number, crane, start.coordinates(crane).state)
+            tasks.append(task)
+        self._plant.exchange(indices, cranes)
+        self._plant.reset(indices, starts, [task.obstacles if task else () for task in tasks])
+        states = self._plant.states()
+        everything = zip(indices.tolist(), cranes, numbers, tasks, strict=True)
+        for index, crane, number, task in everything:
+            state = CraneState(*states[index].tolist())
             judge = None if task is None else TaskJudge(task, crane.control_period)
             self._judge.begin(index, judge)
             stream = np.random.default_rng(number)
-            self._operator.reset(index, operators[index], stream, start, crane, task)
+            self._operator.reset(index, operators[index], stream, state, crane, task)
         self._step_index[indices] = 0
         self._begun[indices] = True
         self._ended[indices] = False

@@ -15,14 +15,18 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
+from crane_env.kinematics import payload_position
 from crane_env.observation import CraneState, is_sound, largest_state
 from crane_env.parameters import CraneParameters
+from crane_env.plant.contact import Outline, stop
 from crane_env.plant.drives import Drives, Stroke
 from crane_env.plant.outcome import Outcome
 from crane_env.plant.single import (
     DRIVE_ERROR,
     DRUM,
+    REACH,
     SETPOINT,
+    SWAY,
     Plant,
     build_model,
     cable_gains,
@@ -32,6 +36,7 @@ from crane_env.plant.single import (
 )
 from crane_env.plant.start import AT_REST, Start
 from crane_env.support.checks import whole
+from crane_env.tasks.task import Obstacle
 
 VARIABLE = ("payload_mass", "cable_stiffness", "cable_length_initial", "drive_bandwidth")
 """Parameters in which cranes that are stepped together may differ."""
@@ -81,6 +86,9 @@ class VectorPlant:
         self._largest: Any = CraneState._make(
             np.full(len(cranes), bound) for bound in largest_state(cranes[0])
         )
+        self._obstacles: list[tuple[Obstacle, ...]] = [()] * len(cranes)
+        self._obstructed = 0
+        self._outlines = np.tile(Outline.of((), cranes[0]), (len(cranes), 1))
         everyone = np.arange(len(cranes))
         self.exchange(everyone, cranes)
         self.reset(everyone, [AT_REST] * len(cranes))
@@ -94,6 +102,7 @@ class VectorPlant:
         return {
             "cranes": self.cranes,
             "threads": self.threads,
+            "obstacles": self._obstacles,
             "state": self._batch.state.copy(),
             "gains": self._cable_gains.copy(),
         }
@@ -101,6 +110,8 @@ class VectorPlant:
     def __setstate__(self, saved: dict[str, Any]) -> None:
         """Rebuilds the batch and restores the states."""
         self.__init__(saved["cranes"], threads=saved["threads"])  # type: ignore[misc]
+        everyone = np.arange(len(self))
+        self.reset(everyone, [AT_REST] * len(self), saved["obstacles"])
         self._batch.state[:] = saved["state"]
         self._cable_gains[:] = saved["gains"]
 
@@ -138,12 +149,18 @@ class VectorPlant:
         if heavier:
             self._batch.set_const(heavier)
 
-    def reset(self, indices: NDArray[np.intp], starts: Sequence[Start]) -> None:
+    def reset(
+        self,
+        indices: NDArray[np.intp],
+        starts: Sequence[Start],
+        obstacles: Sequence[Sequence[Obstacle]] | None = None,
+    ) -> None:
         """Places cranes with their hoists at rest.
 
         Args:
             indices: which cranes, in ascending order.
             starts: where each of them begins.
+            obstacles: that stop the payload of each until its next reset; None: none.
 
         Raises:
             ValueError: a value outside its range; all cranes stay where they are.
@@ -152,6 +169,11 @@ class VectorPlant:
             start.coordinates(self.cranes[index])
             for index, start in zip(indices.tolist(), starts, strict=True)
         ]
+        for index, walls in zip(indices.tolist(), obstacles or [()] * len(indices), strict=True):
+            if walls or self._obstacles[index]:
+                self._obstructed += bool(walls) - bool(self._obstacles[index])
+                self._obstacles[index] = tuple(walls)
+                self._outlines[index] = Outline.of(walls, self.cranes[index])
         position = np.array([place.position for place in places])
         velocity = np.array([place.velocity for place in places])
         self._put(indices, position, velocity, position[:, DRUM])
@@ -195,18 +217,67 @@ class VectorPlant:
         gains = cable_gains(self._stiffness, self._damping, hoist.middle)
         for column, gain in enumerate(gains):
             np.copyto(self._cable_gains[:, column], gain, where=moving)
-        broken = np.zeros(len(self), dtype=np.bool_)
-        try:
-            self._batch.step(moving, self._substeps)
-        except SimulationError as error:
-            broken[error.ids] = True
+        collision_speed = np.zeros(len(self))
+        if self._obstructed:
+            close = moving & self._close_to_obstacles()
+            broken = self._advance(moving & ~close, self._substeps)
+            if close.any():
+                broken |= self._step_along_obstacles(close, collision_speed)
+        else:
+            broken = self._advance(moving, self._substeps)
         state, tension = self.measure()
         failed = moving & ~(is_sound(state, self._largest) & ~broken)
         if failed.any():
             indices = np.flatnonzero(failed)
             self._put(indices, position[failed], velocity[failed], position[failed, DRUM])
             state, tension = self.measure()
-        return Outcome(state, tension, travel.acceleration, travel.limited, failed)
+        return Outcome(state, tension, travel.acceleration, travel.limited, collision_speed, failed)
+
+    def _advance(self, moving: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+        """Takes physics steps; returns the cranes that could not, shape (N,)."""
+        broken = np.zeros(len(self), dtype=np.bool_)
+        try:
+            self._batch.step(moving, steps)
+        except SimulationError as error:
+            broken[error.ids] = True
+        return broken
+
+    def _close_to_obstacles(self) -> NDArray[np.bool_]:
+        """The cranes whose payloads may meet an obstacle in this period, shape (N,)."""
+        s, _, reach, _, sway, _ = self.states().T
+        x, depth = payload_position(s, reach, sway), reach * np.cos(sway)
+        left, right, top = self._outlines.T
+        close: NDArray[np.bool_] = (left < x) & (x < right) & (depth > top)
+        return close
+
+    def _step_along_obstacles(
+        self, close: NDArray[np.bool_], hardest: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Moves some cranes on for a control period, each as `Plant` does.
+
+        Args:
+            close: the cranes, shape (N,).
+            hardest: speed of each crane's hardest collision is put here [m/s], shape (N,).
+
+        Returns:
+            The cranes that could not, shape (N,).
+        """
+        unable = np.zeros(len(self), dtype=np.bool_)
+        for _ in range(self._substeps):
+            before = self.states()
+            broken = self._advance(close, 1)
+            unable |= broken
+            state, _ = self.measure()
+            close = close & ~broken & is_sound(state, self._largest)
+            after = np.column_stack(state)
+            for index in np.flatnonzero(close).tolist():
+                then, now = (CraneState(*rows[index].tolist()) for rows in (before, after))
+                stopped = stop(self._obstacles[index], then, now)
+                if stopped is not None:
+                    self._position[index, SWAY : REACH + 1] = stopped[:2]
+                    self._velocity[index, SWAY : REACH + 1] = stopped[2:4]
+                    hardest[index] = max(hardest[index], stopped.speed)
+        return unable
 
     def measure(self) -> tuple[CraneState, NDArray[np.float64]]:
         """Motion of each crane now, and the tensions of the cables [N], arrays of shape (N,)."""

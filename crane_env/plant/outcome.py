@@ -15,6 +15,8 @@ class Outcome(NamedTuple):
         cable_tension: now [N]; exactly 0 when slack.
         acceleration: mean acceleration of the trolley's setpoint over the period [m/s^2].
         limited: the speed limit or a limit switch overruled the commanded acceleration.
+        collision_speed: at which the payload met an obstacle, across its face; 0 if it met none
+            [m/s].
         failed: the equations of motion had no usable solution; the crane is where it was before.
     """
 
@@ -22,4 +24,5 @@ class Outcome(NamedTuple):
     cable_tension: Any
     acceleration: Any
     limited: Any
+    collision_speed: Any
     failed: Any

@@ -28,10 +28,12 @@ import numpy as np
 
 from crane_env.observation import CraneState, is_sound, largest_state
 from crane_env.parameters import CraneParameters
+from crane_env.plant.contact import Outline, stop
 from crane_env.plant.drives import Drives, Stroke
 from crane_env.plant.outcome import Outcome
 from crane_env.plant.start import AT_REST, Start
 from crane_env.support.fixed import fixed
+from crane_env.tasks.task import Obstacle, place_of
 
 SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
 """Places of the joints among positions and velocities."""
@@ -121,23 +123,35 @@ class Plant:
         """Parameters and full integration state: a copy continues bit for bit."""
         state = np.empty(mujoco.mj_stateSize(self.model, mujoco.mjtState.mjSTATE_INTEGRATION))
         mujoco.mj_getState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
-        return {"parameters": self._parameters, "state": state, "gains": self._cable_gains.copy()}
+        return {
+            "parameters": self._parameters,
+            "obstacles": self._obstacles,
+            "state": state,
+            "gains": self._cable_gains.copy(),
+        }
 
     def __setstate__(self, saved: dict[str, object]) -> None:
         """Rebuilds the model and restores the state."""
         self.__init__(saved["parameters"])  # type: ignore[misc]
+        self.reset(obstacles=saved["obstacles"])  # type: ignore[arg-type]
         self._cable_gains[:] = saved["gains"]
         signature = mujoco.mjtState.mjSTATE_INTEGRATION
         mujoco.mj_setState(self.model, self.data, saved["state"], signature)
         mujoco.mj_forward(self.model, self.data)
 
-    def reset(self, start: Start = AT_REST) -> None:
+    def reset(self, start: Start = AT_REST, obstacles: Sequence[Obstacle] = ()) -> None:
         """Places the crane; refused, it stays where it is.
+
+        Args:
+            start: where it begins.
+            obstacles: that stop the payload until the next reset.
 
         Raises:
             ValueError: a value outside its range.
         """
         position, velocity = start.coordinates(self._parameters)
+        self._obstacles = tuple(obstacles)
+        self._outline = Outline.of(obstacles, self._parameters)
         self._put(position, velocity, position[DRUM])
 
     def _put(
@@ -170,7 +184,11 @@ class Plant:
         self._control[0] = travel.acceleration
         self._control[1] = hoist_acceleration
         self._set_cable_gains(drum_middle)
-        mujoco.mj_step(self.model, self.data, nstep=self._substeps)
+        collision_speed = 0.0
+        if self._obstacles:
+            collision_speed = self._step_along_obstacles()
+        else:
+            mujoco.mj_step(self.model, self.data, nstep=self._substeps)
         state, tension = self.measure()
         failed = not is_sound(state, self._largest)
         if failed:
@@ -178,7 +196,29 @@ class Plant:
             self._put(position, velocity, drum)
             self.data.time = begin
             state, tension = self.measure()
-        return Outcome(state, tension, travel.acceleration, travel.limited, failed)
+        return Outcome(state, tension, travel.acceleration, travel.limited, collision_speed, failed)
+
+    def _step_along_obstacles(self) -> float:
+        """Moves on for a control period; returns the speed of the hardest collision [m/s]."""
+        state, hardest = self.state(), 0.0
+        x, depth = place_of(state)
+        left, right, top = self._outline
+        if not (left < x < right and depth > top):
+            mujoco.mj_step(self.model, self.data, nstep=self._substeps)
+            return hardest
+        for _ in range(self._substeps):
+            before = state
+            mujoco.mj_step(self.model, self.data)
+            state = self.state()
+            if not is_sound(state, self._largest):
+                break
+            stopped = stop(self._obstacles, before, state)
+            if stopped is not None:
+                self._position[SWAY : REACH + 1] = stopped[:2]
+                self._velocity[SWAY : REACH + 1] = stopped[2:4]
+                hardest = max(hardest, stopped.speed)
+                state = self.state()
+        return hardest
 
     def strike(self, speed: float) -> None:
         """Strikes the payload across the cable, so that its speed changes by this [m/s]."""

@@ -14,6 +14,9 @@ from crane_env.support.fields import with_fields
 from crane_env.tasks.drawn import FAMILIES, DrawnTasks
 from crane_env.tasks.task import Task
 
+STREAM = 2
+"""Beside an episode's number, the seed of its task; 1 is that of its crane."""
+
 TaskSpec = str | Mapping[str, Any] | Task | DrawnTasks | None
 """What `make_task` makes a task of."""
 
@@ -84,28 +87,25 @@ def check_task(
     Raises:
         ValueError: it cannot; the message says why.
     """
-    # Whether a family fits does not depend on what is drawn.
-    task_of_episode(given, np.random.default_rng(0), parameters, start)
+    draw_task(given, 0, parameters, start)  # Whether a family fits does not depend on what is drawn
 
 
-def task_of_episode(
-    given: Task | DrawnTasks | None,
-    rng: np.random.Generator,
-    parameters: CraneParameters,
-    start: CraneState,
+def draw_task(
+    given: Task | DrawnTasks | None, episode: int, parameters: CraneParameters, start: CraneState
 ) -> Task | None:
     """The task itself, or one drawn of a family.
 
     Args:
         given: as `make_task` makes it.
-        rng: of this episode's task.
+        episode: the number that seeds the episode's operator too.
         parameters: the crane.
         start: where it begins.
 
     Raises:
         ValueError: the crane cannot do it from this start; the message says why.
     """
-    task = given.draw(rng, parameters, start) if isinstance(given, DrawnTasks) else given
-    if task is not None:
-        task.check(parameters, start)
-    return task
+    if isinstance(given, DrawnTasks):
+        given = given.draw(np.random.default_rng((episode, STREAM)), parameters, start)
+    if given is not None:
+        given.check(parameters, start)
+    return given
