@@ -35,7 +35,7 @@ from crane_env.episode.trajectory import Trajectory
 from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file
 from crane_env.support.extras import require
 
-METRICS_FORMAT = "oilcrane-metrics-1"
+METRICS_FORMAT = "oilcrane-metrics-2"
 """Version of the layout of metrics.parquet."""
 
 PARTIAL_AGE = 60.0

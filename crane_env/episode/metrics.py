@@ -48,6 +48,17 @@ class Metrics:
         limit_violations: steps on which the action was clipped, the drive overruled, or the
             trolley faster than its limit [-].
         stage_cost: eq. (6) summed over the episode, minus the sum of the rewards [m^2/s].
+        completion_time: from the start until the task was done [s]; nan if it was not.
+        arrival_time: until the payload was first within the tolerance of the last goal [s]; nan if
+            it never was, or without a task.
+        travel_presses: of the travel buttons [-].
+        hoist_presses: of the hoist buttons [-].
+        reversals: presses of a travel button after one of the opposite [-].
+        pressed_time: time with a button pressed [s]; the rest was spent waiting.
+        way_ratio: way of the payload over the direct one to the goals [-]; nan without a task.
+        direct_way: from the start to the goals, one after another [m]; nan without a task.
+        index_of_difficulty: of the task, see `task_metrics` [bit]; nan without one.
+        low_sway: largest |theta| near people's height [rad]; nan if the payload never came there.
         act_median: median time of a call of `act` [s].
         act_p99: 99th percentile of the time of `act` [s].
         act_max: longest `act` [s].
@@ -68,12 +79,27 @@ class Metrics:
     slack_time: float
     limit_violations: int
     stage_cost: float
+    completion_time: float
+    arrival_time: float
+    travel_presses: int
+    hoist_presses: int
+    reversals: int
+    pressed_time: float
+    way_ratio: float
+    direct_way: float
+    index_of_difficulty: float
+    low_sway: float
     act_median: float
     act_p99: float
     act_max: float
     act_late: float
     solver_failures: int
     simulation_failed: bool
+
+    @property
+    def presses(self) -> int:
+        """Of all buttons."""
+        return self.travel_presses + self.hoist_presses
 
     def __str__(self) -> str:
         """One line an index."""

@@ -43,6 +43,7 @@ EARNED = (
     "reward_sway",
     "reward_acceleration",
     "simulation_failed",
+    "task_success",
 )
 """Entries of `info` that describe what the action led to."""
 
@@ -256,7 +257,7 @@ def _trajectories(
     buttons = np.array(pressed).reshape(len(pressed), len(cranes), -1)
     columns = dict(zip(BEFORE, table[:, :, :-1], strict=False))
     columns |= dict(zip(AFTER, table[len(BEFORE) :, :, 1:], strict=True))
-    failed = columns.pop("simulation_failed")
+    failed, done = columns.pop("simulation_failed"), columns.pop("task_success")
     act_time = np.full(failed.shape[1], np.nan)
     for period, duration in acts:
         if period < len(act_time):
@@ -277,6 +278,7 @@ def _trajectories(
             origin=origin,
             solver_failures=solver_failures,
             simulation_failed=bool(failed[index, length - 1]),
+            task_success=bool(done[index, length - 1]),
         )
         for index, (crane, task, origin, length) in enumerate(
             zip(cranes, tasks, origins, lengths, strict=True)

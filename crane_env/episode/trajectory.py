@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
@@ -11,6 +12,15 @@ from numpy.typing import NDArray
 
 from crane_env.episode.metrics import Metrics, after_release, integral_absolute_error
 from crane_env.episode.origin import Origin
+from crane_env.episode.task_metrics import (
+    arrival_time,
+    direct_way,
+    index_of_difficulty,
+    low_sway,
+    presses,
+    reversals,
+    way_ratio,
+)
 from crane_env.operators.base import ButtonEvent, Buttons
 from crane_env.operators.recording import ENVIRONMENT, FORMAT, button_events, check_environment
 from crane_env.parameters import CraneParameters
@@ -19,7 +29,14 @@ from crane_env.support.extras import require
 from crane_env.support.parquet import read_parquet, write_parquet
 from crane_env.tasks.task import Task
 
-KEPT_APART = ("parameters", "task", "origin", "solver_failures", "simulation_failed")
+KEPT_APART = (
+    "parameters",
+    "task",
+    "origin",
+    "solver_failures",
+    "simulation_failed",
+    "task_success",
+)
 """What is no column of the table, but JSON among its metadata."""
 
 SPEED_TOLERANCE = 0.02
@@ -60,6 +77,7 @@ class Trajectory:
         solver_failures: answers that were a fallback's, see `crane_env.controller`.
         simulation_failed: the simulation diverged in the last step, where the episode ends. What
             was played until then is no measure of the controller and belongs in no mean.
+        task_success: the task was done in the last step, where the episode ends.
 
     Raises:
         ValueError: columns of other types or lengths, or without a row.
@@ -92,6 +110,7 @@ class Trajectory:
     origin: Origin = field(default_factory=Origin)
     solver_failures: int = 0
     simulation_failed: bool = False
+    task_success: bool = False
 
     def __post_init__(self) -> None:
         """Refuses what is no record."""
@@ -178,6 +197,7 @@ class Trajectory:
                 origin=Origin(**said["origin"]),
                 solver_failures=checks.whole("solver_failures", said["solver_failures"]),
                 simulation_failed=checks.flag("simulation_failed", said["simulation_failed"]),
+                task_success=checks.flag("task_success", said["task_success"]),
             )
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is not a whole trajectory: {error}") from error
@@ -211,6 +231,8 @@ def measure(trajectory: Trajectory) -> Metrics:
     last_samples = max(1, round(last_period / period))
     too_fast = np.abs(trajectory.trolley_velocity) > parameters.trolley_speed_max + SPEED_TOLERANCE
     violations = trajectory.action_clipped | trajectory.drive_limited | too_fast
+    task, start = trajectory.task, float(trajectory.payload_position[0])
+    travel_presses, hoist_presses = presses(trajectory.buttons)
     act_time = trajectory.act_time[np.isfinite(trajectory.act_time)]
     return Metrics(
         IAE=integral_absolute_error(
@@ -226,6 +248,18 @@ def measure(trajectory: Trajectory) -> Metrics:
         slack_time=float(np.count_nonzero(trajectory.cable_tension == 0.0) * period),
         limit_violations=int(np.count_nonzero(violations)),
         stage_cost=-float(trajectory.reward.sum()),
+        completion_time=len(trajectory) * period if trajectory.task_success else math.nan,
+        arrival_time=arrival_time(task, trajectory.payload_position, period),
+        travel_presses=travel_presses,
+        hoist_presses=hoist_presses,
+        reversals=reversals(trajectory.travel_reference),
+        pressed_time=float(np.count_nonzero(trajectory.buttons.any(axis=1)) * period),
+        way_ratio=way_ratio(task, trajectory.payload_position),
+        direct_way=direct_way(task, start),
+        index_of_difficulty=index_of_difficulty(task, start),
+        low_sway=low_sway(
+            trajectory.cable_length, trajectory.sway_angle, parameters.cable_length_max
+        ),
         act_median=float(np.median(act_time)),
         act_p99=float(np.percentile(act_time, 99)),
         act_max=float(act_time.max()),
