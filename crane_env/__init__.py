@@ -10,6 +10,7 @@ import importlib.metadata
 import gymnasium
 
 from crane_env.controller import Controller
+from crane_env.episode.data_card import write_data_card
 from crane_env.episode.metrics import Metrics
 from crane_env.episode.play import run_episode, run_episodes
 from crane_env.episode.practice import practise
@@ -67,6 +68,7 @@ __all__ = [
     "replay",
     "run_episode",
     "run_episodes",
+    "write_data_card",
     "write_script",
 ]
 

@@ -46,6 +46,9 @@ COMMANDS = {
     "table-memory": Command(
         "table_memory", "mpc,results", "measures tabulated controllers: error against memory"
     ),
+    "film": Command(
+        "film", "film,mpc,results", "films one controller, or two side by side, with one operator"
+    ),
     "benchmark": Command("benchmark", "mpc,results", "measures speed, as ratios taken in one run"),
 }
 

@@ -7,12 +7,12 @@ episode, its indices, two plots and a film.
 """
 
 import gymnasium as gym
-import imageio
 import matplotlib.pyplot as plt
 import numpy as np
 
 import crane_env
 from baselines import make_controller
+from crane_env.rendering.film import write_film
 
 # %%
 # An environment holds the crane and its operator. Here the operator presses the buttons at the
@@ -56,4 +56,4 @@ view = {"render_mode": "rgb_array", "render_width": 640, "render_height": 528}
 env = gym.make("OILCrane-v0", operator="table1:1", **view)
 film = gym.wrappers.RenderCollection(env)
 crane_env.run_episode(film, make_controller("adaptive"), seed=0, max_steps=400)
-imageio.mimsave("first_drive.mp4", film.render()[::5], fps=10)
+write_film("first_drive.mp4", film.render()[::5], rate=10)
