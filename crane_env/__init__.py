@@ -1,6 +1,6 @@
 """Operator-in-the-loop overhead crane: MuJoCo plant, random operators, Gymnasium environment.
 
-Importing this package registers `OILCrane-v0` with Gymnasium.
+Importing this package registers `OILCrane-v0` and `OILCraneTask-v0` with Gymnasium.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ from crane_env.tasks.task import Goal, Obstacle, Task
 EPISODE_STEPS = 1250
 """Control steps of one episode: 25 s at 20 ms; the last event of Table I is at 17.75 s."""
 
+TASK_STEPS = 6000
+"""Control steps in which a task is to be done: 120 s."""
+
 gymnasium.register(
     id="OILCrane-v0",
     entry_point="crane_env.environment.single:OILCraneEnv",
@@ -39,6 +42,14 @@ gymnasium.register(
     max_episode_steps=EPISODE_STEPS,
     # The checker repeats on every step what the tests prove once; it costs as much as the physics.
     disable_env_checker=True,
+)
+gymnasium.register(
+    id="OILCraneTask-v0",
+    entry_point="crane_env.environment.single:OILCraneEnv",
+    vector_entry_point="crane_env.environment.vector:OILCraneVectorEnv",
+    max_episode_steps=TASK_STEPS,
+    disable_env_checker=True,
+    kwargs={"task": "position", "operator": "person:trained"},
 )
 
 __all__ = [

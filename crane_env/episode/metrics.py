@@ -59,6 +59,8 @@ class Metrics:
         direct_way: from the start to the goals, one after another [m]; nan without a task.
         index_of_difficulty: of the task, see `task_metrics` [bit]; nan without one.
         low_sway: largest |theta| near people's height [rad]; nan if the payload never came there.
+        collisions: control periods in which the payload met an obstacle [-].
+        collision_speed: of the hardest [m/s]; 0 without one.
         act_median: median time of a call of `act` [s].
         act_p99: 99th percentile of the time of `act` [s].
         act_max: longest `act` [s].
@@ -89,6 +91,8 @@ class Metrics:
     direct_way: float
     index_of_difficulty: float
     low_sway: float
+    collisions: int
+    collision_speed: float
     act_median: float
     act_p99: float
     act_max: float

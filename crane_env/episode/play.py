@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from crane_env.controller import Controller, check_controller, reported_failures
 from crane_env.environment.options import seeds_of_each
 from crane_env.episode.origin import Origin
-from crane_env.episode.trajectory import Trajectory
+from crane_env.episode.trajectory import Collision, Trajectory
 from crane_env.observation import Observation
 from crane_env.operators.script import ButtonScript
 from crane_env.parameters import CraneParameters
@@ -44,6 +44,7 @@ EARNED = (
     "reward_acceleration",
     "simulation_failed",
     "task_success",
+    "collision_speed",
 )
 """Entries of `info` that describe what the action led to."""
 
@@ -257,7 +258,7 @@ def _trajectories(
     buttons = np.array(pressed).reshape(len(pressed), len(cranes), -1)
     columns = dict(zip(BEFORE, table[:, :, :-1], strict=False))
     columns |= dict(zip(AFTER, table[len(BEFORE) :, :, 1:], strict=True))
-    failed, done = columns.pop("simulation_failed"), columns.pop("task_success")
+    failed, done, speed = map(columns.pop, EARNED[-3:])
     act_time = np.full(failed.shape[1], np.nan)
     for period, duration in acts:
         if period < len(act_time):
@@ -279,6 +280,10 @@ def _trajectories(
             solver_failures=solver_failures,
             simulation_failed=bool(failed[index, length - 1]),
             task_success=bool(done[index, length - 1]),
+            collisions=tuple(
+                Collision(float(columns["time"][index, k]), float(speed[index, k]))
+                for k in np.flatnonzero(speed[index, :length])
+            ),
         )
         for index, (crane, task, origin, length) in enumerate(
             zip(cranes, tasks, origins, lengths, strict=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,11 +36,25 @@ KEPT_APART = (
     "solver_failures",
     "simulation_failed",
     "task_success",
+    "collisions",
 )
 """What is no column of the table, but JSON among its metadata."""
 
 SPEED_TOLERANCE = 0.02
 """The trolley may exceed its setpoint by this much while its drive settles [m/s]."""
+
+
+class Collision(NamedTuple):
+    """A control period in which the payload met an obstacle.
+
+    Attributes:
+        time: at which the period began [s].
+        speed: across the obstacle's face [m/s].
+    """
+
+    time: float
+    speed: float
+
 
 Reals = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -78,6 +92,7 @@ class Trajectory:
         simulation_failed: the simulation diverged in the last step, where the episode ends. What
             was played until then is no measure of the controller and belongs in no mean.
         task_success: the task was done in the last step, where the episode ends.
+        collisions: of the payload with obstacles, in order of time.
 
     Raises:
         ValueError: columns of other types or lengths, or without a row.
@@ -111,6 +126,7 @@ class Trajectory:
     solver_failures: int = 0
     simulation_failed: bool = False
     task_success: bool = False
+    collisions: tuple[Collision, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuses what is no record."""
@@ -198,6 +214,10 @@ class Trajectory:
                 solver_failures=checks.whole("solver_failures", said["solver_failures"]),
                 simulation_failed=checks.flag("simulation_failed", said["simulation_failed"]),
                 task_success=checks.flag("task_success", said["task_success"]),
+                collisions=tuple(
+                    Collision(*map(checks.not_negative, Collision._fields, one))
+                    for one in said["collisions"]
+                ),
             )
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is not a whole trajectory: {error}") from error
@@ -260,6 +280,8 @@ def measure(trajectory: Trajectory) -> Metrics:
         low_sway=low_sway(
             trajectory.cable_length, trajectory.sway_angle, parameters.cable_length_max
         ),
+        collisions=len(trajectory.collisions),
+        collision_speed=max((one.speed for one in trajectory.collisions), default=0.0),
         act_median=float(np.median(act_time)),
         act_p99=float(np.percentile(act_time, 99)),
         act_max=float(act_time.max()),

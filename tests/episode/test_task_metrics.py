@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 
 from baselines import make_controller
-from crane_env.episode.play import run_episode
+from crane_env.episode.play import run_episode, run_episodes
 from crane_env.episode.task_metrics import (
     arrival_time,
     direct_way,
@@ -21,7 +22,7 @@ from crane_env.episode.task_metrics import (
     way_ratio,
 )
 from crane_env.episode.trajectory import Trajectory
-from crane_env.tasks.task import Goal, Task
+from crane_env.tasks.task import Goal, Obstacle, Task
 
 TWO = Task(goals=(Goal(position=4.0), Goal(position=2.0, tolerance=0.25)))
 
@@ -74,3 +75,38 @@ def test_a_task_that_was_done_has_its_time_and_keeps_it_in_the_file(tmp_path: ob
     stopped = run_episode(env, make_controller("lqr"), seed=1, max_steps=50)
     assert not stopped.task_success
     assert math.isnan(stopped.metrics().completion_time)
+
+
+class Ahead:
+    """Drives the trolley forward, whatever the operator asks for; one crane or many."""
+
+    def reset(self) -> None:
+        pass
+
+    def act(self, observation: Any) -> Any:
+        return np.clip(2.0 * (1.0 - observation[..., 1:2]), -2.0, 2.0)
+
+
+def test_successes_and_collisions_are_kept_of_one_crane_as_of_many(tmp_path: object) -> None:
+    wall = Obstacle(left=2.0, right=2.5, top=6.0)
+    blocked = Task(goals=(Goal(position=5.0),), obstacles=(wall,))
+    passed = Task(goals=(Goal(position=1.0, tolerance=0.5, speed_limit=2.0, hold=0.1),))
+    both: dict[str, Any] = {"operator": [], "max_episode_steps": 250}
+    tasks = (blocked, passed, None)
+    many = run_episodes(
+        gymnasium.make_vec("OILCrane-v0", num_envs=3, task=tasks, **both), Ahead(), seed=0
+    )
+    for index, task in enumerate(tasks):
+        env = gymnasium.make("OILCrane-v0", task=task, **both)
+        alone = run_episode(env, Ahead(), seed=index)
+        file = f"{tmp_path}/episode.parquet"
+        alone.to_parquet(file)
+        for one in (alone, Trajectory.from_parquet(file)):
+            for name in ("task", "task_success", "collisions"):
+                assert getattr(one, name) == getattr(many[index], name)
+            assert one.payload_position.tobytes() == many[index].payload_position.tobytes()
+    assert len(many[1]) < len(many[0]) == len(many[2]) == 250
+    metrics = many[0].metrics()
+    assert metrics.collisions == len(many[0].collisions) >= 1
+    assert metrics.collision_speed == max(speed for _, speed in many[0].collisions) > 1.0
+    assert many[1].metrics().collision_speed == 0.0
