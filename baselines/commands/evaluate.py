@@ -48,7 +48,8 @@ class Options:
     Attributes:
         controllers: names of controllers; package.module:factory for one of your own.
         operators: who presses the buttons: table1 (all ten manoeuvres of the paper's Table I),
-            table1:N (one of them), manoeuvre, random, stress, or script:FILE (CSV or JSON).
+            table1:N (one of them), manoeuvre, random, stress, script:FILE (CSV or JSON), or
+            recording:FILE (of this crane).
         seeds: seeds of the episodes: numbers, or FIRST:END for all from FIRST to before END. They
             matter to the operators manoeuvre, random and stress only.
         parameters: the crane: a preset (paper or field), or a JSON object, or a file with one, of

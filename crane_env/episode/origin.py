@@ -42,8 +42,9 @@ class Origin:
     def __post_init__(self) -> None:
         """Refuses what is no origin."""
         for name in ("operator", "versions"):
-            if not isinstance(getattr(self, name), Mapping):
-                raise ValueError(f"{name} must be a mapping, not {checks.shown(self.operator)}.")
+            given = getattr(self, name)
+            if not isinstance(given, Mapping):
+                raise ValueError(f"{name} must be a mapping, not {checks.shown(given)}.")
         if not isinstance(self.controller, str):
             raise ValueError(f"controller must be a name, not {checks.shown(self.controller)}.")
         if self.seed is not None:

@@ -41,12 +41,19 @@ def test_the_card_counts_what_is_there_and_can_be_written_again(folder: Path) ->
 
 
 def test_a_folder_reads_as_one_table_without_our_code(folder: Path) -> None:
+    import duckdb
     import pyarrow.dataset
 
     (folder / "other.parquet").unlink()
     table = pyarrow.dataset.dataset(folder, format="parquet").to_table()
     assert table.num_rows == 150
     assert str(table.schema.field("forward").type) == "bool"
+    rows = duckdb.sql(
+        "SELECT filename, count(*), count(*) FILTER (forward) "
+        f"FROM read_parquet('{folder}/**/*.parquet', filename=true) GROUP BY 1"
+    ).fetchall()
+    assert sorted(Path(name).name for name, *_ in rows) == ["a.parquet", "b.parquet", "c.parquet"]
+    assert all(count == 50 >= pressed for _, count, pressed in rows)
 
 
 def test_what_has_no_card_is_refused(
