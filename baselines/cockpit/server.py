@@ -7,6 +7,7 @@ acknowledged yet: a page that is slow or stopped gets fewer states, never old on
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import threading
 import time
@@ -123,17 +124,12 @@ class Cockpit:
         loop = asyncio.get_running_loop()
 
         def listen() -> None:
-            said: Hello | State | Saved | None = None
-            try:
-                while True:
-                    said = self._connection.recv()
-                    loop.call_soon_threadsafe(self._hear, said)
-            except (EOFError, OSError):
-                pass
-            try:
-                loop.call_soon_threadsafe(self._told, None)
-            except RuntimeError:  # the loop has ended first
-                return
+            with contextlib.suppress(RuntimeError):  # the server's loop has ended first
+                try:
+                    while True:
+                        loop.call_soon_threadsafe(self._hear, self._connection.recv())
+                except (EOFError, OSError):
+                    loop.call_soon_threadsafe(self._told, None)
 
         threading.Thread(target=listen, daemon=True).start()
         while True:
