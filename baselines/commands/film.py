@@ -21,7 +21,15 @@ from numpy.typing import NDArray
 from baselines.commands.evaluate import crane_parameters
 from baselines.commands.terminal import Job, check_writable, progress, run
 from baselines.registry import make_controller
-from crane_env import EPISODE_STEPS, CraneParameters, Person, Trajectory, make_operator, practise
+from crane_env import (
+    EPISODE_STEPS,
+    TASK_STEPS,
+    CraneParameters,
+    Person,
+    Trajectory,
+    make_operator,
+    practise,
+)
 from crane_env.controller import Controller
 from crane_env.episode.recording import arguments_of
 from crane_env.rendering.canvas import SMALLEST_PICTURE
@@ -33,9 +41,6 @@ PROGRAM = "oilcrane film"
 
 RECORDING = "recording:"
 """How the name of an operator begins that brings crane, task and length with it."""
-
-TASK_STEPS = 6000
-"""Control periods that a task may take: 120 s."""
 
 CAPTION_HEIGHT = 32
 """Of the strip above a picture [pixel]."""
