@@ -284,7 +284,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         return observation, reward, success, outcome.failed, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws the crane, the pendant, and reference and payload velocity.
+        """Draws the crane, the task, the pendant, and reference and payload velocity.
 
         Returns:
             A picture, uint8, shape (render_height, render_width, 3), in mode "rgb_array".
@@ -294,7 +294,9 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         """
         return cast(
             "NDArray[np.uint8] | None",
-            self._pictures.draw(self._make_renderer, self._buttons, self._references[0]),
+            self._pictures.draw(
+                self._make_renderer, self._buttons, self._references[0], self._judge
+            ),
         )
 
     def _make_renderer(self) -> CraneRenderer:

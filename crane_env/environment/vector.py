@@ -353,7 +353,12 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         operator = self._operator
         return cast(
             "tuple[NDArray[np.uint8], ...] | None",
-            self._pictures.draw(self._make_renderer, operator.buttons, operator.references[:, 0]),
+            self._pictures.draw(
+                self._make_renderer,
+                operator.buttons,
+                operator.references[:, 0],
+                self._judge.judges,
+            ),
         )
 
     def _make_renderer(self) -> VectorRenderer:

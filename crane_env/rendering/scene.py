@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -27,6 +28,9 @@ from crane_env.rendering.instruments import (
     draw_numbers,
     draw_pendant,
 )
+from crane_env.rendering.site import GOAL, MOST_DRAWN, site
+from crane_env.tasks.judge import TaskJudge
+from crane_env.tasks.task import place_of
 
 FLOOR_DEPTH_DRAWN = 13.5
 """Depth of the floor below the sheave for which crane.xml places its camera [m]."""
@@ -82,16 +86,19 @@ class CraneRenderer:
         self._hall = hall(plant.parameters)
         self._chart = Chart(plant.parameters.travel_speed)
         most_marks = 2 * round(2 * MARKS_REACH)
-        self._scene = mujoco.MjvScene(self._model, most_marks + 200)
+        self._scene = mujoco.MjvScene(self._model, most_marks + 5 * MOST_DRAWN + 200)
         make_canvas = WindowCanvas if window else PixelCanvas
         self._canvas: Canvas = make_canvas(self._model, width=width, height=height)
 
-    def draw(self, buttons: Buttons, travel_reference: float) -> NDArray[np.uint8] | None:
+    def draw(
+        self, buttons: Buttons, travel_reference: float, judge: TaskJudge | None = None
+    ) -> NDArray[np.uint8] | None:
         """Draws the crane as it is now.
 
         Args:
             buttons: that the operator presses.
             travel_reference: payload velocity that they ask for [m/s].
+            judge: of the task; None: there is none.
 
         Returns:
             The pixels, uint8, shape (height, width, 3); None where they are in a window.
@@ -105,18 +112,22 @@ class CraneRenderer:
             state.sway_rate,
         )
         self._chart.add(now, travel_reference, velocity)
+        aim = Reading("trolley", f"{state.trolley_velocity:+.2f} m/s")
+        if judge is not None:
+            gap = judge.task.goals[judge.stage].position - place_of(state).position
+            aim = Reading("to goal", f"{gap:+.2f} m", GOAL)
         readings = (
             Reading("time", f"{now:.2f} s"),
             Reading("reference", f"{travel_reference:+.2f} m/s", REFERENCE),
             Reading("payload", f"{velocity:+.2f} m/s", PAYLOAD),
-            Reading("trolley", f"{state.trolley_velocity:+.2f} m/s"),
+            aim,
             Reading("sway", f"{math.degrees(state.sway_angle):+.1f} deg"),
             Reading("cable", f"{state.cable_length:.2f} m"),
         )
 
         def painter(picture: mujoco.MjrRect, context: mujoco.MjrContext) -> None:
             strip = Strip(picture, context)
-            self._arrange(state, travel_reference, velocity)
+            self._arrange(state, travel_reference, velocity, judge)
             mujoco.mjr_render(strip.rest, self._scene, context)
             mujoco.mjr_rectangle(strip.pixels, *BACKGROUND, 1.0)
             draw_numbers(strip, readings)
@@ -129,8 +140,10 @@ class CraneRenderer:
         """Closes the window and frees the graphics memory; can be called again."""
         self._canvas.close()
 
-    def _arrange(self, state: CraneState, travel_reference: float, velocity: float) -> None:
-        """Sets up the scene: crane, hall, and the velocities as arrows at the payload."""
+    def _arrange(
+        self, state: CraneState, travel_reference: float, velocity: float, judge: TaskJudge | None
+    ) -> None:
+        """Sets up the scene: crane, hall, task, and the velocities as arrows at the payload."""
         parameters, trolley = self._plant.parameters, state.trolley_position
         self._data.qpos[:] = self._plant.data.qpos
         mujoco.mj_fwdPosition(self._model, self._data)
@@ -149,6 +162,7 @@ class CraneRenderer:
             self._hall,
             marks(parameters, trolley),
             shadows(parameters, trolley, payload),
+            site(parameters, judge.task, judge.stage, trolley) if judge is not None else (),
         ):
             for solid in solids:
                 self._add_solid(solid)
@@ -212,13 +226,17 @@ class VectorRenderer:
             self._renderers.append(CraneRenderer(twin, width=width, height=height, window=False))
 
     def draw(
-        self, buttons: NDArray[np.bool_], travel_references: NDArray[np.float64]
+        self,
+        buttons: NDArray[np.bool_],
+        travel_references: NDArray[np.float64],
+        judges: Sequence[TaskJudge | None],
     ) -> tuple[NDArray[np.uint8], ...]:
         """Draws the cranes as they are now.
 
         Args:
             buttons: that each operator presses, in the order of `Buttons`, shape (N, 4).
             travel_references: that each operator asks for [m/s], shape (N,).
+            judges: of each crane's task.
 
         Returns:
             The pixels of each, uint8, shape (height, width, 3).
@@ -227,7 +245,7 @@ class VectorRenderer:
         for index, (twin, renderer) in enumerate(zip(self._copies, self._renderers, strict=True)):
             self._plant.copy_to(index, twin)
             pressed = Buttons(*buttons[index].tolist())
-            picture = renderer.draw(pressed, float(travel_references[index]))
+            picture = renderer.draw(pressed, float(travel_references[index]), judges[index])
             assert picture is not None, "a renderer without a window returns its pixels"
             pictures.append(picture)
         return tuple(pictures)

@@ -163,7 +163,7 @@ class OverWallTasks(DrawnTasks):
 
     name: str = "over-wall"
     approach: Range = (2.0, 5.0)
-    width: Range = (1.0, 2.0)
+    width: Range = (1.5, 2.5)
     beyond: Range = (2.0, 5.0)
     lift: Range = (LEAST_LIFT, 3.0)
 
@@ -201,7 +201,7 @@ class BayTasks(DrawnTasks):
 
     name: str = "bay"
     approach: Range = (2.0, 7.0)
-    width: Range = (1.0, 2.0)
+    width: Range = (1.5, 2.5)
     bay: Range = (1.0, 2.0)
     lift: Range = (LEAST_LIFT, 3.0)
 
