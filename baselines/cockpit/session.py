@@ -172,6 +172,7 @@ class Session:
         match message:
             case Take() | Leave():
                 self._dead_man.begin()
+                self._replayed = None
             case Hold():
                 self._dead_man.hear(message.sequence, seen, now, message.buttons)
             case Stop():
@@ -191,6 +192,7 @@ class Session:
         self._hand.buttons = RELEASED if self._stopped else held
         if any(self._hand.buttons):
             self._end_replay()  # whoever presses takes over
+            self._replayed = None
         before, chosen = self._env.buttons, self._driver.chosen
         observation, _, _, failed, info = self._env.step(self._action)
         if failed:
