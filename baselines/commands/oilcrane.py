@@ -39,6 +39,9 @@ COMMANDS = {
     ),
     "reproduce": Command("reproduce", "mpc,results", "puts the paper to the test"),
     "play": Command("play", "mpc,results,play", "opens the crane in a browser, driven by hand"),
+    "study": Command(
+        "study", "mpc,results", "lets persons bring payloads to places with every controller"
+    ),
     "train": Command("train", "results,rl", "trains a reinforcement learner, or exports one"),
     "compare-learners": Command(
         "compare_learners", "mpc,policies,results", "compares reinforcement learning with the MPCs"

@@ -22,9 +22,10 @@ from baselines.evaluation import foreign_code
 from baselines.evaluation.provenance import code_identity
 from baselines.mpc.settings import MpcSettings
 from baselines.registry import make_controller, settings_type
-from crane_env import CraneParameters, Trajectory, run_episode
+from crane_env import EPISODE_STEPS, CraneParameters, Person, Trajectory, practise, run_episode
 from crane_env.controller import Controller
 from crane_env.environment.options import start_of
+from crane_env.operators.person.operator import PersonOperator
 from crane_env.operators.registry import make_operator, operator_program
 from crane_env.stage_cost import StageCost
 from crane_env.support import checks
@@ -41,7 +42,7 @@ class Setup:
         crane: the crane that is driven.
         nominal: the crane that the controllers believe in; None: the one that is driven.
         settings: the controllers' optimal control problem; its cost is also the reward's.
-        max_steps: end of the episode [control periods], if before the environment's own.
+        max_steps: length of the episode [control periods]; None: the environment's own.
 
     Raises:
         ValueError: `max_steps` is no whole number of at least 1.
@@ -97,19 +98,28 @@ class EpisodeSpec:
             be there any more.
         seed: of the environment's reset.
         setup: crane, settings and length.
+        start: where the crane begins, as the options of the environment's reset.
+        task: that the operator pursues, as the environment takes it; None: none.
+        practice: seed of the session in which the operator, a person, tries crane and controller
+            beforehand; None: there was none.
 
     Raises:
-        ValueError: `seed` is none.
+        ValueError: a seed that is none.
     """
 
     controller: str
     operator: Mapping[str, Any]
     seed: int
     setup: Setup
+    start: Mapping[str, float] = field(default_factory=dict)
+    task: Mapping[str, Any] | str | None = None
+    practice: int | None = None
 
     def __post_init__(self) -> None:
         """Refuses what is no seed."""
         object.__setattr__(self, "seed", checks.seed(self.seed))
+        if self.practice is not None:
+            object.__setattr__(self, "practice", checks.seed(self.practice))
 
     @property
     def foreign(self) -> tuple[str, ...]:
@@ -125,7 +135,8 @@ class EpisodeSpec:
     def key(self) -> str:
         """Digest of the specification and the code, 12 hexadecimal digits."""
         sources = [foreign_code.sources(name) for name in self.foreign]
-        given = [self.controller, self.operator, self.seed, self.setup.key]
+        begun = [dict(self.start), self.task, self.practice]
+        given = [self.controller, self.operator, self.seed, self.setup.key, begun]
         return digest([sources, given])[:12]
 
     def read(self) -> str | None:
@@ -199,9 +210,17 @@ def play(spec: EpisodeSpec) -> Trajectory:
         ValueError: the specification asks for something that there is not.
         ImportError: a package is missing; the message names the extra that brings it.
     """
-    setup, options = spec.setup, {"operator": spec.operator}
+    setup = spec.setup
+    options: dict[str, Any] = {**spec.start, "operator": spec.operator}
+    if spec.task is not None:
+        options["task"] = spec.task
     try:
         controller = build_controller(spec) if spec.foreign else _controller(spec.controller, setup)
+        if spec.practice is not None:
+            person = json.dumps(spec.operator, sort_keys=True)
+            options["operator"] = _practised(
+                person, spec.controller, setup, spec.practice, tuple(spec.start.items())
+            )
         env = _environment(setup.crane, setup.settings.cost)
         observation, _ = env.reset(seed=spec.seed)  # whoever the operator is, it starts alike
         controller.act(observation)
@@ -210,12 +229,13 @@ def play(spec: EpisodeSpec) -> Trajectory:
             controller,
             seed=spec.seed,
             options=options,
-            max_steps=setup.max_steps,
+            max_steps=EPISODE_STEPS if setup.max_steps is None else setup.max_steps,
             controller_name=spec.controller,
         )
     except BaseException:  # whatever it left them in, nothing is used again
         _environment.cache_clear()
         _controller.cache_clear()
+        _practised.cache_clear()
         raise
 
 
@@ -263,7 +283,23 @@ def _controller(name: str, setup: Setup) -> Controller:
 
 @functools.lru_cache(maxsize=4)
 def _environment(crane: CraneParameters, cost: StageCost) -> gymnasium.Env[Any, Any]:
-    return gymnasium.make("OILCrane-v0", parameters=crane, cost=cost)
+    return gymnasium.make("OILCrane-v0", parameters=crane, cost=cost, max_episode_steps=-1)
+
+
+@functools.lru_cache(maxsize=16)
+def _practised(
+    person: str, controller: str, setup: Setup, seed: int, start: tuple[tuple[str, float], ...]
+) -> Person:
+    """The person of an operator's mapping in JSON, after the practice session.
+
+    Raises:
+        ValueError: the operator is no person.
+    """
+    operator = make_operator(json.loads(person))
+    if not isinstance(operator, PersonOperator):
+        raise ValueError(f"Only persons can practise, not the operator {person}.")
+    trying = _controller(controller, setup)
+    return practise(operator.program, trying, seed=seed, parameters=setup.crane, start=dict(start))
 
 
 def digest(data: Any) -> str:

@@ -1,0 +1,257 @@
+"""Lets persons who look at the payload bring it to its place, with every controller.
+
+oilcrane study
+oilcrane study --controllers manual ltv --skills trained --seeds 0:100 --no-sensitivity
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from baselines.commands.evaluate import crane_parameters, seed_range
+from baselines.commands.terminal import FailedError, Job, failure_lines, progress, run
+from baselines.evaluation.comparison import check_controllers, compare, index_values
+from baselines.evaluation.drawing import Format, draw
+from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
+from baselines.evaluation.results import EpisodeResult, ResultsFolder
+from baselines.evaluation.workers import processes
+from baselines.study.figures import (
+    difficulty_figure,
+    oscillation_figure,
+    rank_figure,
+    sensitivity_figure,
+)
+from baselines.study.oscillation import oscillation_map
+from baselines.study.outcome import outcome_of, paired_times
+from baselines.study.plan import TIME_LIMIT, Cell, all_cells, cell_specs
+from baselines.study.report import BASELINE, Findings, Varied, markdown_report, ranks
+from baselines.study.sensitivity import variations
+from crane_env.operators.person.person import PERSONS, TRAINED
+from crane_env.operators.registry import operator_program
+from crane_env.operators.table1 import TABLE_1
+from crane_env.support.atomic_file import atomic_file
+from crane_env.support.checks import whole
+from crane_env.support.extras import require
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PROGRAM = "oilcrane study"
+
+WAITS = (0.25, 0.5, 0.6, 0.8, 1.0, 1.2, 1.6)
+"""Of the map of oscillation, as shares of the run-out."""
+
+RUN_OUTS = (0.6, 1.2, 1.8, 2.4)
+"""Of the map of oscillation [s]."""
+
+MOST_TASKS = 10_000
+"""Most tasks of a cell; more take longer than anybody waits."""
+
+MAP_EPISODES = 40
+"""Of each of its points."""
+
+Skill = Literal["novice", "trained", "expert"]
+Family = Literal["position", "over-wall", "bay", "sequence"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Lets persons who look at the payload bring it to its place, with every controller.
+
+    Each person practises with the controller, then does a few tasks. Writes a report (Markdown)
+    with paired intervals, its figures, and the metrics of every task (Parquet, JSON). Ctrl-C keeps
+    the finished tasks, and the same command then goes on from there.
+
+    Attributes:
+        controllers: names of controllers; package.module:factory for one of your own.
+        skills: of the persons.
+        tasks: families of tasks.
+        seeds: of the tasks: numbers, or FIRST:END for all from FIRST to before END.
+        tasks_per_person: that a person does after one practice session.
+        sensitivity: whether to vary every number that was assumed of a person, half and twice.
+        parameters: the crane: a preset (paper or field), or a JSON object, or a file with one, of
+            the fields of CraneParameters that differ from the paper's.
+        output: folder of the results. Tasks that it holds of the same code are not done again.
+        report: the report; None is report.md in the output folder.
+        jobs: number of processes; None is one a core.
+        format: of the figures; several may be given.
+    """
+
+    controllers: tuple[str, ...] = ("manual", "linear", "adaptive", "ltv", "lqr", "ppo")
+    skills: tuple[Skill, ...] = ("novice", "trained", "expert")
+    tasks: tuple[Family, ...] = ("position",)
+    seeds: tuple[str, ...] = ("0:300",)
+    tasks_per_person: int = 5
+    sensitivity: bool = True
+    parameters: str = "paper"
+    output: Path = Path("results/study")
+    report: Path | None = None
+    jobs: int | None = None
+    format: tuple[Format, ...] = ("png",)
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is to be done.
+
+    Attributes:
+        cells: the study's own.
+        varied: cells with one number of the person changed: its field and value.
+        seeds: of the tasks.
+        few: of the tasks of the varied cells.
+        table: the manoeuvres of Table I.
+        setup: of the tasks.
+        tasks_per_person: after one practice session.
+    """
+
+    cells: Sequence[Cell]
+    varied: Sequence[tuple[str, float, Cell]]
+    seeds: Sequence[int]
+    few: Sequence[int]
+    table: Sequence[EpisodeSpec]
+    setup: Setup
+    tasks_per_person: int
+
+    @functools.cached_property
+    def specs(self) -> dict[str, list[EpisodeSpec]]:
+        """The episodes of each cell, by the cell's place in the study."""
+        own = {f"own {place}": (cell, self.seeds) for place, cell in enumerate(self.cells)}
+        varied = {f"varied {i}": (cell, self.few) for i, (_, _, cell) in enumerate(self.varied)}
+        return {
+            key: cell_specs(cell, seeds, self.setup, self.tasks_per_person)
+            for key, (cell, seeds) in {**own, **varied}.items()
+        }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command line and returns the exit code."""
+    return run(PROGRAM, Options, prepare, arguments)
+
+
+def prepare(options: Options, command: Sequence[str]) -> Job:
+    """Tries everything that can be wrong; returns the study.
+
+    Raises:
+        ValueError: an option that means nothing, or a value out of range.
+        ImportError: a package is missing; the message names the extra that brings it.
+        OSError: a file that cannot be read, or a folder that cannot be written.
+    """
+    jobs = processes(options.jobs)
+    require("matplotlib.figure", extra="results")
+    together = whole("tasks_per_person", options.tasks_per_person, 1)
+    crane = crane_parameters(options.parameters, "parameters")
+    setup = Setup(crane=crane, max_steps=round(TIME_LIMIT / crane.control_period))
+    given = itertools.chain.from_iterable(map(seed_range, options.seeds))
+    seeds = list(dict.fromkeys(itertools.islice(given, MOST_TASKS + 1)))
+    if len(seeds) > MOST_TASKS:
+        raise ValueError(f"seeds must be at most {MOST_TASKS}.")
+    if len({seed // together for seed in seeds}) < 2:
+        raise ValueError(
+            f"seeds must give at least two persons, of {together} tasks each, to form intervals of."
+        )
+    names = list(dict.fromkeys(options.controllers))
+    skills = [operator_program(PERSONS[skill].name) for skill in dict.fromkeys(options.skills)]
+    table = [f"table1:{number}" for number in range(1, len(TABLE_1) + 1)]
+    vary = options.sensitivity and BASELINE in names and TRAINED.skill in options.skills
+    study = Study(
+        cells=all_cells(names, skills, list(dict.fromkeys(options.tasks))),
+        varied=[
+            (one.field, one.value, Cell(BASELINE, one.operator, options.tasks[0]))
+            for one in (variations(TRAINED) if vary else ())
+        ],
+        seeds=seeds,
+        few=seeds[: max(len(seeds) // 5, 2 * together)],
+        table=episode_specs(names, table, [0], Setup(crane=crane)),
+        setup=setup,
+        tasks_per_person=together,
+    )
+    check_controllers(study.table)
+    folder = ResultsFolder(options.output)
+    folder.prepare()
+    report = options.report or options.output / "report.md"
+    return functools.partial(perform, study, folder, report, jobs, command, options.format)
+
+
+def perform(
+    study: Study,
+    folder: ResultsFolder,
+    report: Path,
+    jobs: int,
+    command: Sequence[str],
+    formats: Sequence[Format],
+) -> None:
+    """Does the study, writes its report and says where everything is.
+
+    Raises:
+        FailedError: some tasks or figures failed.
+    """
+    specs = [*study.table, *(spec for some in study.specs.values() for spec in some)]
+    specs = list({spec.key: spec for spec in specs}.values())
+    with progress("Tasks", len(specs)) as advance:
+        played = compare(
+            specs, folder, jobs=jobs, keep="metrics", command=command, on_result=advance
+        )
+    results = {result.spec.key: result for result in played}
+    found = findings(study, results)
+    with atomic_file(report) as partial:
+        partial.write_text(markdown_report(found), encoding="utf-8")
+    print(f"Report: {report}.")
+    drawn = draw(figures(found, folder), formats)
+    print(f"Results: {', '.join(map(str, (folder.metrics_file, *drawn.files)))}.")
+    if failures := [*failure_lines(played), *drawn.failures]:
+        raise FailedError(*failures)
+
+
+def findings(study: Study, results: dict[str, EpisodeResult]) -> Findings:
+    """What the results say."""
+
+    def of(key: str) -> list[EpisodeResult]:
+        return [results[spec.key] for spec in study.specs[key]]
+
+    own = [outcome_of(cell, of(f"own {place}")) for place, cell in enumerate(study.cells)]
+    varied = []
+    for place, (field, value, cell) in enumerate(study.varied):
+        whole_cell = study.cells.index(cell._replace(operator=operator_program(TRAINED.name)))
+        unchanged = of(f"own {whole_cell}")[: len(study.few)]
+        changed = outcome_of(cell, of(f"varied {place}"))
+        varied.append(Varied(field, value, changed, outcome_of(cell, unchanged)))
+    errors = index_values([results[spec.key] for spec in study.table], "IAE")
+    return Findings(
+        outcomes=own,
+        errors={
+            name: float(np.mean(np.concatenate(list(row.values())))) for name, row in errors.items()
+        },
+        waits=WAITS,
+        run_outs=RUN_OUTS,
+        oscillation=oscillation_map(TRAINED, WAITS, RUN_OUTS, MAP_EPISODES),
+        varied=varied,
+    )
+
+
+def figures(found: Findings, folder: ResultsFolder) -> dict[Path, Callable[[], Figure]]:
+    """What is drawn of the findings, by file."""
+    family = found.families[0]
+    shown = found.skills[len(found.skills) // 2]
+    drawn: dict[Path, Callable[[], Figure]] = {
+        folder.figures / "difficulty": lambda: difficulty_figure(found.of(shown, family)),
+        folder.figures / "ranks": lambda: rank_figure(ranks(found, family)),
+        folder.figures / "oscillation": lambda: oscillation_figure(
+            found.oscillation, found.waits, found.run_outs
+        ),
+    }
+    if found.varied:
+        rng = np.random.default_rng(0)
+        pairs = {
+            f"{one.field} = {one.value:g}": paired_times(one.outcome, one.own, rng)
+            for one in found.varied
+        }
+        changes = {label: (pair.mean, *pair.interval) for label, pair in pairs.items()}
+        drawn[folder.figures / "sensitivity"] = lambda: sensitivity_figure(changes)
+    return drawn
