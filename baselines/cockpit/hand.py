@@ -44,6 +44,11 @@ class Hand:
         """
         self.operator = None if name == YOU else own_operator(name)
 
+    @property
+    def program(self) -> Any:
+        """What the operator plays: the environment begins where a recording of it began."""
+        return getattr(self.operator, "program", None)
+
     def reset(
         self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters
     ) -> None:
