@@ -346,7 +346,8 @@ def _timing_part(evidence: Evidence) -> list[str]:
     )
     host = machine()
     return [
-        "Manoeuvre 1 of Table I, one episode at a time, by the wall clock, on "
+        "Manoeuvre 1 of Table I, one episode at a time, by the wall clock, as busy as the machine "
+        "was: the percentiles of a shared one are preemption more than computation. On "
         f"{host['processor'] or host['architecture']} ({host['cores']} cores) with Python "
         f"{host['python']}. `nmpc-b-ipopt` is the same problem as `nmpc-b`, solved by IPOPT.",
         markdown_table(
