@@ -17,7 +17,7 @@ import numpy as np
 
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
-from crane_env.support.checks import choice, positive_range, whole
+from crane_env.support.checks import choice, positive_range, whole, within
 from crane_env.support.fields import check_fields
 from crane_env.tasks.task import (
     HOLD_TIME,
@@ -35,6 +35,9 @@ Range = tuple[float, float]
 
 HEADROOM = 0.5
 """From the top of a drawn wall up to the highest payload, and down to the highest goal [m]."""
+
+ENDS = 1e-3, 1e6
+"""Shortest and longest way that a family may be told [m]."""
 
 LEAST_LIFT = 1.0
 """Least height that a payload is lifted over a drawn wall [m]."""
@@ -65,6 +68,9 @@ class DrawnTasks(abc.ABC):
         """Refuses what no task can be drawn with."""
         choice("name of this family of tasks", self.name, [type(self).name])
         check_fields(self, positive_range, self.ranges)
+        for name in self.ranges:
+            for end in getattr(self, name):
+                within(f"An end of {name}", end, *ENDS, "m")
         self._goal(0.0)
 
     @abc.abstractmethod
@@ -273,7 +279,7 @@ def _heights(
             f"A drawn task {name!r} needs a payload that hangs at least {least:g} m below the "
             f"girder, to be lifted over a wall; it starts at {at.depth:g} m."
         )
-    highest = at.depth - parameters.cable_length_min - HEADROOM
+    highest = max(at.depth - parameters.cable_length_min - HEADROOM, lift[0])
     top = at.depth - rng.uniform(lift[0], min(lift[1], highest))
     return float(top), float(rng.uniform(min(top + HEADROOM, at.depth), at.depth))
 

@@ -22,7 +22,7 @@ from crane_env.kinematics import payload_position
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
 from crane_env.support.arithmetic import cosine
-from crane_env.support.checks import choice, not_negative, positive, real, shown
+from crane_env.support.checks import choice, positive, shown, within
 from crane_env.support.fields import check_fields
 
 POSITION_TOLERANCE = 0.05
@@ -33,6 +33,12 @@ SPEED_LIMIT = 0.05
 
 HOLD_TIME = 2.0
 """How long the payload is to stand at a goal [s]; assumed."""
+
+FARTHEST = 1e6
+"""Goals and obstacles are no farther than the longest rails go [m]."""
+
+LONGEST_HOLD = 1e6
+"""[s]; eleven days."""
 
 Part = TypeVar("Part", "Goal", "Obstacle")
 
@@ -60,9 +66,9 @@ class Goal:
 
     def __post_init__(self) -> None:
         """Refuses what is no place."""
-        check_fields(self, real, ("position",))
+        check_fields(self, within, ("position",), -FARTHEST, FARTHEST, "m")
         check_fields(self, positive, ("tolerance", "speed_limit"))
-        check_fields(self, not_negative, ("hold",))
+        check_fields(self, within, ("hold",), 0.0, LONGEST_HOLD, "s")
         if self.depth is not None:
             check_fields(self, positive, ("depth",))
 
@@ -86,7 +92,7 @@ class Obstacle:
 
     def __post_init__(self) -> None:
         """Refuses what cannot stand."""
-        check_fields(self, real, ("left", "right"))
+        check_fields(self, within, ("left", "right"), -FARTHEST, FARTHEST, "m")
         check_fields(self, positive, ("top",))
         if not self.left < self.right:
             raise ValueError(

@@ -217,3 +217,16 @@ def test_a_refused_task_leaves_the_crane_as_it_was() -> None:
     ranges = {"cable_length_initial": (2.0, 8.0)}
     with pytest.raises(ValueError, match="Environment 0: A drawn task 'bay' needs a payload"):
         gymnasium.make_vec("OILCrane-v0", num_envs=2, task="bay", randomisation=ranges)
+
+
+def test_the_environment_with_a_task_is_the_same_but_for_its_defaults() -> None:
+    env = gymnasium.make("OILCraneTask-v0")
+    twin = gymnasium.make("OILCrane-v0", task="position", operator="person:trained")
+    assert env.reset(seed=0)[0].tobytes() == twin.reset(seed=0)[0].tobytes()
+    assert env.unwrapped.task == twin.unwrapped.task is not None
+    assert env.spec is not None
+    assert env.spec.max_episode_steps == 6000
+    vector = gymnasium.make_vec("OILCraneTask-v0", num_envs=2, task="bay")
+    vector.reset(seed=0)
+    assert vector.unwrapped.max_episode_steps == 6000
+    assert [len(task.obstacles) for task in vector.unwrapped.tasks] == [2, 2]

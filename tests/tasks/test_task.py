@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -9,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
 from crane_env import CraneParameters, CraneState, Goal, Obstacle, Task, make_task
 from crane_env.tasks.drawn import FAMILIES, DrawnTasks
+from crane_env.tasks.judge import TaskJudge
 from crane_env.tasks.registry import draw_task
 from crane_env.tasks.task import place_of
 
@@ -40,9 +42,9 @@ def family(name: str, **fields: Any) -> DrawnTasks:
         ({"goals": [3.0]}, "A task's Goal must be one or a mapping, not 3.0"),
         ({"goals": [{"depth": 3.0}]}, "A task's Goal needs its fields position, depth"),
         ({"goals": [{"place": 3.0}]}, "Unknown Goal field 'place'; valid: position"),
-        ({"goals": [{"position": math.nan}]}, "position must be a finite number, not nan"),
+        ({"goals": [{"position": math.nan}]}, "position must be from -1e.06 to 1e.06 m, not nan"),
         ({"goals": [{"position": 3, "tolerance": -0.1}]}, "tolerance must be a positive"),
-        ({"goals": [{"position": 3, "hold": -2.0}]}, "hold must be zero or a positive"),
+        ({"goals": [{"position": 3, "hold": -2.0}]}, "hold must be from 0 to 1e.06 s"),
         ({"goals": [{"position": 3, "depth": 0.0}]}, "depth must be a positive finite number"),
         (
             {"goals": [{"position": 3}], "obstacles": [{"left": 2, "right": 1, "top": 3}]},
@@ -52,6 +54,7 @@ def family(name: str, **fields: Any) -> DrawnTasks:
         ({"name": "bay", "distance": (1, 2)}, "Unknown 'bay' field 'distance'; valid: "),
         ({"name": "position", "distance": (3, 2)}, "distance must be a range .low, high."),
         ({"name": "position", "tolerance": -1.0}, "tolerance must be a positive"),
+        ({"name": "bay", "width": (1e-9, 1.0)}, "An end of width must be from 0.001 to 1e.06 m"),
         ({"name": "sequence", "count": 0}, "count must be a whole number of at least 1"),
     ],
 )
@@ -126,6 +129,46 @@ def test_what_is_drawn_can_be_done_from_wherever_the_payload_starts(
     crossed = [wall for wall in task.obstacles if ends[0] < wall.left and wall.right < ends[1]]
     assert bool(crossed) == (name in ("over-wall", "bay"))
     assert all(crane.cable_length_min < wall.top < place_of(start).depth for wall in crossed)
+
+
+FIELDS = ("name", "goals", "obstacles", "position", "tolerance", "hold", "left", "right", "top")
+odd = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.sampled_from([10**400, 1e308, 5e-324, 0.5, 3.0, 6.0, -1.0]),
+    st.floats(),
+    st.sampled_from((*FAMILIES, *FIELDS)),
+)
+values = st.recursive(
+    odd,
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(FIELDS), inner, max_size=4)
+    ),
+    max_leaves=10,
+)
+likely = st.one_of(
+    st.fixed_dictionaries(
+        {"name": st.sampled_from(sorted(FAMILIES))},
+        optional={
+            name: odd | st.tuples(odd, odd)
+            for name in ("distance", "tolerance", "count", "lift", "bay", "width", "hold")
+        },
+    ),
+    st.fixed_dictionaries(
+        {"goals": st.lists(st.fixed_dictionaries({"position": odd}, optional={"hold": odd}))},
+        optional={"obstacles": st.lists(st.fixed_dictionaries(dict.fromkeys(FIELDS[-3:], odd)))},
+    ),
+)
+
+
+@given(values | likely)
+@settings(deadline=None, max_examples=200)
+def test_any_json_value_is_a_task_that_can_be_judged_or_a_value_error(value: Any) -> None:
+    with contextlib.suppress(ValueError):
+        task = draw_task(make_task(value), 0, PAPER, REST)
+        if task is not None:
+            TaskJudge(task, PAPER.control_period).watch(1, REST)
 
 
 def test_distances_of_open_tasks_are_log_uniform_and_both_ways_equally_likely() -> None:
