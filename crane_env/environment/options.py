@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from crane_env.environment.randomisation import Randomisation
 from crane_env.observation import CraneState
 from crane_env.operators.base import Operator
 from crane_env.operators.recording import RecordedButtons
@@ -15,6 +16,9 @@ from crane_env.parameters import CraneParameters
 from crane_env.plant.start import Start
 from crane_env.support import checks
 from crane_env.support.checks import choice, real, shown
+from crane_env.tasks.drawn import DrawnTasks
+from crane_env.tasks.registry import check_task
+from crane_env.tasks.task import Task
 
 
 def start_of(options: Mapping[str, Any], operator: Operator, parameters: CraneParameters) -> Start:
@@ -87,6 +91,38 @@ def starts_of_each(
         except ValueError as error:
             raise ValueError(f"Environment {index}: {error}") from error
     return starts
+
+
+def check_tasks(
+    given: Sequence[Task | DrawnTasks | None],
+    cranes: Sequence[CraneParameters],
+    randomisation: Randomisation,
+    starts: Mapping[int, Start],
+) -> None:
+    """Makes sure that some cranes, whichever are drawn, can do their tasks from their starts.
+
+    Args:
+        given: as `make_tasks` makes them, for all cranes.
+        cranes: all of them, before anything is drawn.
+        randomisation: from which their parameters are drawn.
+        starts: of the cranes in question, by number.
+
+    Raises:
+        ValueError: one cannot; the message says why.
+    """
+    checked = set()
+    for index, start in starts.items():
+        case = given[index], cranes[index], start
+        if given[index] is None or case in checked:
+            continue
+        checked.add(case)
+        # Of what is drawn, tasks depend on the initial length alone.
+        lengths = {one.cable_length_initial: one for one in randomisation.check(cranes[index])}
+        for crane in lengths.values():
+            try:
+                check_task(given[index], crane, start.coordinates(crane).state)
+            except ValueError as error:
+                raise ValueError(f"Environment {index}: {error}") from error
 
 
 def chosen_by(mask: object, count: int) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from crane_env.environment.options import (
     accelerations,
+    check_tasks,
     chosen_by,
     read_options,
     seeds_of_each,
@@ -40,7 +41,7 @@ from crane_env.support.checks import choice, whole
 from crane_env.support.fixed import fixed
 from crane_env.tasks.drawn import DrawnTasks
 from crane_env.tasks.judge import TaskJudge, VectorJudge
-from crane_env.tasks.registry import VectorTaskSpec, check_task, draw_task, make_tasks
+from crane_env.tasks.registry import VectorTaskSpec, draw_task, make_tasks
 from crane_env.tasks.task import Task, check_has_task
 
 if TYPE_CHECKING:
@@ -166,7 +167,9 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         starts = starts_of_each({}, everyone, self._default_operators, self._own_parameters)
         self._operator = VectorOperator(self.num_envs)
         self._default_tasks = make_tasks(task, self.num_envs)
-        self._check_tasks(self._default_tasks, dict(enumerate(starts)))
+        check_tasks(
+            self._default_tasks, self._own_parameters, self._randomisation, dict(enumerate(starts))
+        )
         self._judge = VectorJudge(self.num_envs)
 
         frames = max(1, round(1.0 / self._parameters.control_period))
@@ -255,7 +258,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         indices = np.flatnonzero(chosen)
         default = tasks is self._default_tasks and operators is self._default_operators
         if placed or not default:
-            self._check_tasks(tasks, dict(zip(indices.tolist(), starts, strict=True)))
+            placed_at = dict(zip(indices.tolist(), starts, strict=True))
+            check_tasks(tasks, self._own_parameters, self._randomisation, placed_at)
         randoms = {
             index: seeding.np_random(seeds[index])
             for index in indices.tolist()
@@ -426,28 +430,6 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._step_index[indices] = 0
         self._begun[indices] = True
         self._ended[indices] = False
-
-    def _check_tasks(
-        self, given: Sequence[Task | DrawnTasks | None], starts: Mapping[int, Start]
-    ) -> None:
-        """Makes sure that each crane, whichever is drawn, can do its task from its start.
-
-        Raises:
-            ValueError: one cannot; the message says why.
-        """
-        checked = set()
-        for index, start in starts.items():
-            case = given[index], self._own_parameters[index], start
-            if given[index] is None or case in checked:
-                continue
-            checked.add(case)
-            drawn = self._randomisation.check(self._own_parameters[index])
-            # Of what is drawn, tasks depend on the initial length alone.
-            for crane in {one.cable_length_initial: one for one in drawn}.values():
-                try:
-                    check_task(given[index], crane, start.coordinates(crane).state)
-                except ValueError as error:
-                    raise ValueError(f"Environment {index}: {error}") from error
 
     def _complete(self, info: dict[str, Any]) -> dict[str, Any]:
         info["buttons"] = self._operator.buttons.copy()
