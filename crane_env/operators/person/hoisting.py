@@ -24,7 +24,7 @@ def work_the_hoist(
     """Decides on the hoist; returns whether the way is free to travel."""
     seen, parameters = mind.seen(now), mind.parameters
     wanted, may_travel = _wanted_depth(mind, seen, task, goal, calm=calm)
-    if mind.hoist.due < math.inf:
+    if mind.hoist.due < math.inf or now < mind.hoist_seen_from:
         return may_travel
     speed, stopping = parameters.hoist_speed, 0.5 * parameters.hoist_ramp_time
     gap = 0.0 if wanted is None else wanted - seen.depth
@@ -32,7 +32,7 @@ def work_the_hoist(
         left = mind.hoist.direction * gap / speed - stopping - mind.person.visual_delay
         ahead = mind.timed(left)
         if ahead < interval:
-            mind.hoist.intend((now + max(ahead, 0.0), 0))
+            _let_go(mind, now + max(ahead, 0.0))
         return may_travel
     if abs(gap) <= HOIST_TOLERANCE * goal.tolerance:
         return may_travel
@@ -41,8 +41,16 @@ def work_the_hoist(
         mind.hoist.intend((now, direction))
     elif calm or mind.travel.holds:
         duration = mind.pressed_for(_press_for(mind, abs(gap)))
-        mind.hoist.intend((now, direction), (now + duration, 0))
+        _let_go(mind, now + duration, (now, direction))
     return may_travel
+
+
+def _let_go(mind: Mind, end: float, *before: tuple[float, int]) -> None:
+    """Plans to end a press of the hoist; what comes of it is looked at once it can be seen."""
+    mind.hoist.intend(*before, (end, 0))
+    person = mind.person
+    late = person.visual_delay + person.glance_interval
+    mind.hoist_seen_from = end + mind.parameters.hoist_ramp_time + late
 
 
 def _press_for(mind: Mind, distance: float) -> float:
@@ -65,6 +73,8 @@ def _wanted_depth(
         return goal.depth, True
     if abs(goal.position - seen.position) <= goal.tolerance:
         return (goal.depth if calm else None), True
+    if not any(wall.left < high and low < wall.right for wall in in_the_way):
+        return None, True  # beside the goal, with no wall between
     clear = max(min(wall.top for wall in in_the_way) - CLEARANCE, mind.parameters.cable_length_min)
     if seen.depth <= clear:
         return None, True

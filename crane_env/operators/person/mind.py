@@ -58,6 +58,7 @@ class Mind:
         patience: longest wait for the payload to calm [s]; grows with reversals of one's own.
         awareness: of the motion still to come; grows likewise.
         reversals: how often the person has pressed back after a press.
+        hoist_seen_from: from when on the last hoist press can be judged [s].
         press_begun: when the last travel press began [s].
     """
 
@@ -72,6 +73,7 @@ class Mind:
         self.patience = person.patience
         self.awareness = person.awareness
         self.reversals = 0
+        self.hoist_seen_from = 0.0
         self.press_begun = 0.0
         self._last_direction = 0
 

@@ -16,6 +16,7 @@ from baselines import make_controller
 from baselines.study.lagging_crane import PAPER, PERIOD, operate
 from baselines.study.oscillation import oscillating_share
 from crane_env.environment.single import OILCraneEnv
+from crane_env.episode.play import run_episode
 from crane_env.observation import CraneState
 from crane_env.operators.base import Buttons
 from crane_env.operators.person.experience import Experience
@@ -231,3 +232,12 @@ def test_an_experience_without_a_glance_teaches_nothing() -> None:
     experience.come_to_rest(1.0)
     experience.watch_swing(1.0)
     assert experience.belief == before
+
+
+def test_a_person_looks_at_what_a_hoist_press_did_before_the_next() -> None:
+    """Into a bay: up, across, down, and few corrections; seed 8 drifts within the bay."""
+    env = gymnasium.make("OILCraneTask-v0", task="bay", operator="person:trained")
+    metrics = run_episode(env, make_controller("lqr"), seed=8).metrics()
+    assert not math.isnan(metrics.completion_time)
+    assert metrics.hoist_presses <= 8
+    assert metrics.collisions == 0
