@@ -89,6 +89,7 @@ def control(connection: Connection, opening: Opening) -> None:
 def run(connection: Connection, session: Session, pace: Pace) -> None:
     """Drives, a control step a tick, until the connection is closed."""
     credit, saved = CREDIT, 0
+    buttons, since = None, 0
     try:
         while True:
             now = pace.wait()
@@ -100,10 +101,12 @@ def run(connection: Connection, session: Session, pace: Pace) -> None:
                 tick = message.tick if isinstance(message, Hold) else 0
                 session.hear(message, pace.time_of(tick), now)
             state = session.step(now)
+            if state["buttons"] != buttons:
+                buttons, since = state["buttons"], pace.tick
             if credit:
                 credit -= 1
                 kept = pace.kept
-                state["tick"] = pace.tick
+                state["tick"], state["since"] = pace.tick, since
                 state["kept"] = [kept.steps, kept.late, round(1000.0 * kept.worst, 1), kept.missed]
                 connection.send(State(pace.tick, json.dumps(state)))
             if session.saved[0] != saved:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from baselines.cockpit.drive import Drive
 from baselines.cockpit.lineup import Lineup, build_lineup
 from baselines.cockpit.messages import ACTIONS, CHOICES, Choose, Do, Hold, Message, Stop, Take, read
 from baselines.cockpit.session import OPERATORS, TASKS, Opening, Session
+from crane_env.kinematics import payload_velocity
 from crane_env.operators.base import RELEASED, Buttons
 from crane_env.parameters import CraneParameters
 
@@ -103,6 +105,17 @@ def test_an_operator_drives_until_somebody_presses(lineup: Lineup) -> None:
     assert state["operator"] == "table1:1"
     assert state["presses"] > 0
     assert page.hold(Buttons(up=True), 5)["operator"] == "you"
+
+
+def test_after_a_lost_page_the_predictive_controller_brings_the_payload_to_rest() -> None:
+    page = Page(build_lineup(("manual", "nmpc-b"), CRANE, lambda name: None), "nmpc-b")
+    page.hold(RELEASED, 5)
+    page.hold(FORWARD, 200)
+    for _ in range(400):
+        page.step()
+    after = [page.step()["crane"] for _ in range(150)]
+    assert max(abs(payload_velocity(*crane[1:6])) for crane in after) < 0.02
+    assert max(abs(crane[4]) for crane in after) < math.radians(0.2)
 
 
 @pytest.mark.parametrize("name", OPERATORS)
