@@ -6,6 +6,7 @@ oilcrane play --controller manual --task position
 
 from __future__ import annotations
 
+import threading
 import webbrowser
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -103,7 +104,7 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
 
     def job() -> None:
         if options.browser:
-            webbrowser.open(address)
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         try:
             keep(listener, access, opening, told)
         except CockpitError as error:

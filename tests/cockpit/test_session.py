@@ -205,6 +205,21 @@ def test_the_clock_of_a_task_runs_from_the_first_press_until_it_is_done(lineup: 
     assert page.hold(RELEASED, 1)["goals"] != state["goals"]
 
 
+def test_a_payload_driven_into_a_wall_is_counted_and_replayed_bit_for_bit(lineup: Lineup) -> None:
+    page = Page(lineup)
+    page.say(Choose("", "task", "over-wall"))
+    state = page.hold(RELEASED, 5)
+    ahead = state["goals"][0][0] > 0.0
+    for _ in range(500):
+        state = page.hold(Buttons(forward=ahead, backward=not ahead), 1)
+        if state["collisions"]:
+            break
+    assert state["score"] == pytest.approx(state["clock"] + 10.0)
+    page.hold(RELEASED, 50)
+    page.say(Do("", "replay"))
+    assert page.hold(RELEASED, round(state["time"] / PERIOD) + 60)["replayed"] is True
+
+
 ticks = st.integers(0, 60) | st.integers(0, 2**53 - 1)
 buttons = st.lists(st.booleans(), min_size=4, max_size=4)
 token = st.just("")
