@@ -20,10 +20,10 @@ from multiprocessing.connection import Connection
 import uvicorn
 
 from baselines.cockpit.access import Access
-from baselines.cockpit.loop import Hello, control
+from baselines.cockpit.control.loop import Hello, control
+from baselines.cockpit.control.session import Opening
 from baselines.cockpit.messages import LONGEST
 from baselines.cockpit.server import Cockpit
-from baselines.cockpit.session import Opening
 
 LONGEST_END = 1
 """After this the server's tasks are not waited for [s]."""

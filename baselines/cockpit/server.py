@@ -23,7 +23,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from baselines.cockpit.access import Access, Allowance, Pendant
-from baselines.cockpit.loop import Hello, Saved, State
+from baselines.cockpit.control.loop import Hello, Saved, State
 from baselines.cockpit.messages import Choose, Do, Hold, Leave, Message, Seen, Stop, Take, read
 
 CREDIT = 8

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from baselines.cockpit.access import LOOPBACK, Access
-from baselines.cockpit.hand import YOU
+from baselines.cockpit.control.hand import YOU
+from baselines.cockpit.control.lineup import CANDIDATES
+from baselines.cockpit.control.loop import Hello
+from baselines.cockpit.control.session import NO_TASK, TASKS, Opening
 from baselines.cockpit.house import CockpitError, bind, keep
-from baselines.cockpit.lineup import CANDIDATES
-from baselines.cockpit.loop import Hello
-from baselines.cockpit.session import NO_TASK, TASKS, Opening
 from baselines.commands.evaluate import crane_parameters
 from baselines.commands.terminal import FailedError, Job, run
 from crane_env.operators.registry import make_operator

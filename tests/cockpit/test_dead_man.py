@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.cockpit.dead_man import LONGEST_HOLD, DeadMan
+from baselines.cockpit.control.dead_man import LONGEST_HOLD, DeadMan
 from crane_env.operators.base import RELEASED, Buttons
 
 FORWARD = Buttons(forward=True)

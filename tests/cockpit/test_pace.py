@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from baselines.cockpit.pace import Pace
+from baselines.cockpit.control.pace import Pace
 
 
 class Clock:

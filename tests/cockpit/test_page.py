@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from baselines.cockpit.drive import Drive
-from baselines.cockpit.lineup import build_lineup
+from baselines.cockpit.control.drive import Drive
+from baselines.cockpit.control.lineup import build_lineup
 from tests.cockpit.cockpit_process import CockpitProcess, RawPage, cockpit
 
 DESKTOP, SMALL, PHONE = (1440, 900), (1000, 640), (390, 844)

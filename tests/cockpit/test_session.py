@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from baselines.cockpit.dead_man import LONGEST_HOLD
-from baselines.cockpit.drive import Drive
-from baselines.cockpit.lineup import Lineup, build_lineup
+from baselines.cockpit.control.dead_man import LONGEST_HOLD
+from baselines.cockpit.control.drive import Drive
+from baselines.cockpit.control.lineup import Lineup, build_lineup
+from baselines.cockpit.control.session import OPERATORS, TASKS, Opening, Session
 from baselines.cockpit.messages import ACTIONS, CHOICES, Choose, Do, Hold, Message, Stop, Take, read
-from baselines.cockpit.session import OPERATORS, TASKS, Opening, Session
 from crane_env.kinematics import payload_velocity
 from crane_env.operators.base import RELEASED, Buttons
 from crane_env.parameters import CraneParameters

@@ -13,15 +13,16 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
-from baselines.cockpit.dead_man import DeadMan
-from baselines.cockpit.drive import Again, Drive, Driver
-from baselines.cockpit.hand import YOU, Hand
-from baselines.cockpit.lineup import CANDIDATES, Lineup
+from baselines.cockpit.control.attempt import Attempt
+from baselines.cockpit.control.dead_man import DeadMan
+from baselines.cockpit.control.drive import Again, Drive, Driver
+from baselines.cockpit.control.hand import YOU, Hand
+from baselines.cockpit.control.lineup import CANDIDATES, Lineup
+from baselines.cockpit.control.rest_point import RestPoint
 from baselines.cockpit.messages import Choose, Do, Hold, Leave, Message, Stop, Take
-from baselines.cockpit.rest_point import RestPoint
 from crane_env.environment.single import OILCraneEnv
 from crane_env.observation import Observation
-from crane_env.operators.base import RELEASED, Buttons
+from crane_env.operators.base import RELEASED
 from crane_env.parameters import CraneParameters
 from crane_env.support.checks import choice
 from crane_env.tasks.drawn import FAMILIES
@@ -57,9 +58,6 @@ TASKS = (NO_TASK, *FAMILIES)
 FIRST_TASK = "position"
 """What a person does who is to drive without a task."""
 
-COLLISION = 10.0
-"""What a collision adds to the score of a task [s]."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Opening:
@@ -80,42 +78,6 @@ class Opening:
     operator: str = YOU
     task: str = NO_TASK
     seed: int = 1
-
-
-class Attempt:
-    """How somebody fares in an episode: the clock, from the first press on, presses, collisions."""
-
-    def __init__(self) -> None:
-        self._presses = self._collisions = 0
-        self._begun: float | None = None
-        self._done: float | None = None
-        self._touching = False
-
-    def watch(self, time: float, before: Buttons, now: Buttons, info: dict[str, Any]) -> None:
-        """Looks at a control step that ends at `time` [s]."""
-        new = sum(pressed and not held for held, pressed in zip(before, now, strict=True))
-        if new and self._begun is None:
-            self._begun = time
-        if self._done is not None:
-            return
-        self._presses += new
-        touching = bool(info.get("collision_speed", 0.0))
-        self._collisions += touching and not self._touching
-        self._touching = touching
-        if info["task_success"]:
-            self._done = time
-
-    def tell(self, time: float) -> dict[str, Any]:
-        """What the page is told at `time` [s]."""
-        end = time if self._done is None else self._done
-        clock = 0.0 if self._begun is None else end - self._begun
-        return {
-            "clock": round(clock, 2),
-            "presses": self._presses,
-            "collisions": self._collisions,
-            "score": round(clock + COLLISION * self._collisions, 2),
-            "done": self._done is not None,
-        }
 
 
 class Session:

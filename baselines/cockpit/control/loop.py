@@ -12,10 +12,10 @@ import signal
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
-from baselines.cockpit.lineup import build_lineup
+from baselines.cockpit.control.lineup import build_lineup
+from baselines.cockpit.control.pace import Pace, go_first
+from baselines.cockpit.control.session import BRAKE, OPERATORS, TASKS, Opening, Session
 from baselines.cockpit.messages import Hold, Message, Seen
-from baselines.cockpit.pace import Pace, go_first
-from baselines.cockpit.session import BRAKE, OPERATORS, TASKS, Opening, Session
 
 CREDIT = 25
 """States that may be on their way to the server: half a second of them."""
