@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -161,6 +162,21 @@ def test_a_saved_drive_is_repeated_bit_for_bit_as_a_trajectory(lineup: Lineup) -
     assert digest == drive.digest
     assert len(trajectory) == drive.steps
     assert trajectory.metrics().max_sway > 0.05
+
+
+def test_the_recording_of_a_saved_drive_presses_the_same_buttons(
+    lineup: Lineup, tmp_path: Path
+) -> None:
+    page = Page(lineup)
+    page.hold(RELEASED, 5)
+    page.hold(FORWARD, 60)
+    page.say(Do("", "save"))
+    trajectory, _ = Drive.from_json(page.session.saved[1]).play(lineup.controllers)
+    trajectory.to_parquet(tmp_path / "drive.parquet")
+    opening = Opening(controller="lqr", operator=f"recording:{tmp_path / 'drive.parquet'}")
+    session = Session(opening, lineup)
+    buttons = [session.step(PERIOD * tick)["buttons"] for tick in range(1, len(trajectory))]
+    assert buttons == trajectory.buttons[1:].tolist()
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "oilcrane-drive-1"}'])

@@ -161,7 +161,7 @@ function status(state) {
   if (state.tripped) return ["warn", "Let go, then press again"];
   if (state.replay) return ["wait", `Replay ${(state.replay[0] * page.facts.period).toFixed(1)} s`];
   if (state.replayed !== null) return ["drive", state.replayed ? "Replayed bit for bit" : "Replay differs"];
-  if (state.operator !== "you") return ["wait", `${state.operator} presses: press to take over`];
+  if (state.operator !== "you") return ["wait", `${state.operator}: press to take over`];
   return ["drive", "You hold the pendant"];
 }
 

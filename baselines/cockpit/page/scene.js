@@ -137,7 +137,7 @@ export class Scene {
       c.font = "600 12px system-ui";
       c.textAlign = "center";
       const label = state.goals.length > 1 ? `goal ${number + 1}` : "goal";
-      c.fillText(label, x, depth === null ? y - 22 : y + h / 2 + 15);
+      if (here) c.fillText(label, x, depth === null ? y - 22 : y + h / 2 + 15);
       c.globalAlpha = 1;
     });
   }
