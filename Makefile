@@ -6,7 +6,7 @@ RUN := $(VENV)/bin/python
 PIP := $(RUN) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help evaluate reproduce play test proofs check benchmark docs clean
+.PHONY: help evaluate reproduce play test proofs timing check benchmark docs clean
 
 help:  ## Lists the commands.
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -21,10 +21,13 @@ play: $(VENV)/run.stamp  ## Opens the crane in a browser, to be driven by hand.
 	$(RUN) scripts/play.py $(ARGS)
 
 test: $(VENV)/dev.stamp check  ## Runs the linters and the tests, or some: ARGS=tests/plant.
-	$(RUN) -m pytest -n auto -m "not slow" $(ARGS)
+	$(RUN) -m pytest -n auto -m "not slow and not timing" $(ARGS)
 
 proofs: $(VENV)/dev.stamp  ## Runs the tests that take longer than a few seconds.
 	$(RUN) -m pytest -n auto -m slow $(ARGS)
+
+timing: $(VENV)/dev.stamp  ## Runs the cockpit's proofs by the clock, on a machine that is left alone.
+	$(RUN) -m pytest -m timing $(ARGS)
 
 check: $(VENV)/dev.stamp  ## Runs the linters alone.
 	$(RUN) -m ruff check .

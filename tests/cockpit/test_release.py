@@ -24,7 +24,7 @@ from tests.cockpit.cockpit_process import CockpitProcess, RawPage, cockpit
 from tests.cockpit.raw_chromium import RawChromium
 from tests.cockpit.stalling_proxy import StallingProxy
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.timing
 
 PERIOD = 0.02
 ALLOWED = 0.2
@@ -43,14 +43,12 @@ class Scene:
         self.launch()
 
     def launch(self) -> None:
-        before = chromium_processes()
         mapped = f"MAP localhost:{self.server_port} 127.0.0.1:{self.proxy.port}"
         self.browser: Browser = self._playwright.chromium.launch(
             executable_path=shutil.which("chromium"),
             args=["--no-sandbox", f"--host-resolver-rules={mapped}"],
             handle_sigterm=False,
         )
-        self._before = before
         self.open()
 
     def open(self) -> None:
@@ -59,7 +57,7 @@ class Scene:
         expect(self.page.locator("#status")).to_have_text("You hold the pendant", timeout=15_000)
 
     def processes(self) -> list[int]:
-        return sorted(chromium_processes() - self._before)
+        return chromium_processes()
 
     def press(self, crane: RawPage) -> float:
         """Holds a key; see `held`."""
@@ -83,10 +81,18 @@ def held(crane: RawPage, down: Callable[[], None], up: Callable[[], None]) -> fl
     raise AssertionError("The key never reached the crane.")
 
 
-def chromium_processes() -> set[int]:
-    listed = subprocess.run(["ps", "-eo", "pid=,args="], capture_output=True, text=True).stdout
-    lines = [line.split(maxsplit=1) for line in listed.splitlines()]
-    return {int(pid) for pid, command in lines if "chromium" in command.split()[0]}
+def chromium_processes() -> list[int]:
+    """Those that this process has started, itself or through others."""
+    asked = ["ps", "-eo", "pid=,ppid=,args="]
+    listed = subprocess.run(asked, capture_output=True, text=True).stdout.splitlines()
+    rows = [line.split(maxsplit=3)[:3] for line in listed]
+    ours, found = {os.getpid()}, -1
+    while found != len(ours):
+        found = len(ours)
+        ours |= {int(pid) for pid, parent, _ in rows if int(parent) in ours}
+    return sorted(
+        int(pid) for pid, _, program in rows if int(pid) in ours and "chromium" in program
+    )
 
 
 def send(number: int, processes: list[int]) -> float:

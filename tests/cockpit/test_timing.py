@@ -12,7 +12,7 @@ from playwright.sync_api import sync_playwright
 
 from tests.cockpit.cockpit_process import CockpitProcess, RawPage, cockpit
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.timing
 
 SECONDS = 60.0
 

@@ -144,3 +144,16 @@ def test_what_makes_no_study_is_refused_before_it_begins(
     assert study.main([*arguments, "--output", str(tmp_path / "none")]) == 2
     assert sentence in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.slow
+def test_skill_and_help_decide_who_completes_the_open_tasks() -> None:
+    def completed(controller: str, skill: str, count: int) -> float:
+        cell = Cell(controller, operator_program(f"person:{skill}"), "position")
+        played = [play(spec) for spec in cell_specs(cell, range(1000, 1000 + count), SETUP, 5)]
+        return float(np.mean([one.task_success for one in played]))
+
+    assert completed("adaptive", "trained", 60) >= 0.95
+    assert completed("adaptive", "novice", 40) >= 0.9
+    assert completed("lqr", "expert", 40) >= 0.9
+    assert completed("manual", "novice", 20) < 0.05
