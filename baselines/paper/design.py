@@ -49,7 +49,7 @@ MEANS = tuple(
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ReadingOutcome:
     """What the screen found under a reading.
 
     Attributes:
@@ -102,16 +102,16 @@ class Screening:
         own: outcomes of `own_horizons`.
     """
 
-    walks: tuple[tuple[Outcome, ...], ...]
-    own: tuple[Outcome, ...]
+    walks: tuple[tuple[ReadingOutcome, ...], ...]
+    own: tuple[ReadingOutcome, ...]
 
     @functools.cached_property
-    def outcomes(self) -> dict[Reading, Outcome]:
+    def outcomes(self) -> dict[Reading, ReadingOutcome]:
         """All readings that were screened."""
         return {o.reading: o for part in (*self.walks, self.own) for o in part}
 
     @functools.cached_property
-    def walked(self) -> list[Outcome]:
+    def walked(self) -> list[ReadingOutcome]:
         """All readings of the walks, each once."""
         return list({o.reading: o for walk in self.walks for o in walk}.values())
 
@@ -128,13 +128,13 @@ class Screening:
             if any(p == point for p, _ in steps)
         )
 
-    def best(self, count: int) -> list[Outcome]:
+    def best(self, count: int) -> list[ReadingOutcome]:
         """Readings that can be played with the highest scores, the paper's own horizons first.
 
         Half are of `own_horizons`, half of the walks; among equals, those nearest to the defaults.
         """
 
-        def rank(outcome: Outcome) -> tuple[int, int]:
+        def rank(outcome: ReadingOutcome) -> tuple[int, int]:
             differing = sum(getattr(outcome.reading, p) != getattr(DEFAULT, p) for p in POINTS)
             return -outcome.score, differing
 
@@ -152,7 +152,7 @@ class Screening:
         return list(dict.fromkeys([*named, *(o.reading for o in self.best(best)), *drawn]))
 
 
-def level_scores(outcomes: Iterable[Outcome], point: str) -> dict[Any, list[int]]:
+def level_scores(outcomes: Iterable[ReadingOutcome], point: str) -> dict[Any, list[int]]:
     """Scores at each level of a point."""
     scores: dict[Any, list[int]] = {value: [] for value in LEVELS[point]}
     for o in outcomes:
@@ -244,14 +244,14 @@ def keep(task: ScreenTask, file: Path) -> None:
     write_json(file, [dataclasses.asdict(found[reading]) for reading in task.readings])
 
 
-def outcome(reading: Reading, evidence: Evidence) -> Outcome:
+def outcome(reading: Reading, evidence: Evidence) -> ReadingOutcome:
     """What some evidence says about the claims that can be screened."""
-    return Outcome(
+    return ReadingOutcome(
         reading,
         {claim.name: bool(claim.check(evidence).holds) for claim in CLAIMS if claim.screened},
         {f"{name} {index}": float(evidence.of(name, index).mean()) for name, index in MEANS},
     )
 
 
-def _outcome(data: Mapping[str, Any]) -> Outcome:
-    return Outcome(Reading(**data["reading"]), data["holds"], data["means"])
+def _outcome(data: Mapping[str, Any]) -> ReadingOutcome:
+    return ReadingOutcome(Reading(**data["reading"]), data["holds"], data["means"])

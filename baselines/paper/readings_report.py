@@ -10,7 +10,7 @@ import numpy as np
 from baselines.evaluation.tables import markdown_table
 from baselines.paper.checks import percent
 from baselines.paper.claims import CLAIMS
-from baselines.paper.design import CONFIDENCE, MEANS, Outcome, Screening, Turn, level_scores
+from baselines.paper.design import CONFIDENCE, MEANS, ReadingOutcome, Screening, Turn, level_scores
 from baselines.paper.readings import POINTS, level
 from baselines.paper.stages import Reproduction
 from baselines.paper.verdicts import COUNTED, OFTEN, failing
@@ -117,7 +117,7 @@ def _again_part(reproduction: Reproduction, screening: Screening) -> list[str]:
     ]
 
 
-def level_words(outcomes: Iterable[Outcome], point: str) -> str:
+def level_words(outcomes: Iterable[ReadingOutcome], point: str) -> str:
     """Mean and most claims that hold at each level of a point; a dash if it was not varied."""
     scores = level_scores(outcomes, point)
     if len(scores) < 2:

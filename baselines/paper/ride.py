@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.mpc.prediction.equation1 import sway_step, tangential_acceleration
-from baselines.mpc.prediction.sway_model import Turn, turned
+from baselines.mpc.prediction.sway_model import SwayTurn, turned
 from crane_env.support.extras import require
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def ride(
     gain: Array,
     period: float,
     held: float,
-    turn: Turn,
+    turn: SwayTurn,
     eyes: Eyes,
     limits: Limits,
 ) -> int:

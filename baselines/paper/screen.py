@@ -25,7 +25,7 @@ from baselines.evaluation.episode_spec import Setup
 from baselines.mpc.limits import TrolleyLimits
 from baselines.mpc.linear import condense
 from baselines.mpc.prediction.constant_length import PendulumPrediction
-from baselines.mpc.prediction.sway_model import SwayModel, Turn
+from baselines.mpc.prediction.sway_model import SwayModel, SwayTurn
 from baselines.mpc.prediction.varying_length import TimeVaryingPrediction
 from baselines.mpc.quadratic_program import QuadraticProgram
 from baselines.mpc.settings import SwayState
@@ -155,7 +155,7 @@ class Driver(NamedTuple):
     """
 
     law: Law
-    turn: Turn
+    turn: SwayTurn
     eyes: Eyes
 
     @classmethod

@@ -16,7 +16,7 @@ from baselines.evaluation.drawing import (
     panels_below,
 )
 from baselines.study.difficulty import fit_line
-from baselines.study.outcome import Outcome
+from baselines.study.outcome import CellOutcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +28,7 @@ MAP_COLOURS = "Greys"
 """Of the map, readable in print."""
 
 
-def difficulty_figure(outcomes: Sequence[Outcome]) -> Figure:
+def difficulty_figure(outcomes: Sequence[CellOutcome]) -> Figure:
     """Mean completion time of groups of tasks over their difficulty, with the logarithmic fit.
 
     Args:

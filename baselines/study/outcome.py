@@ -29,7 +29,7 @@ LENGTH_EDGES = (6.0, 9.0)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CellOutcome:
     """What the persons of a cell came to; arrays over its episodes, in the order of their seeds.
 
     Attributes:
@@ -89,7 +89,7 @@ class Outcome:
         return (self.cable_length >= low) & (self.cable_length < high)
 
 
-def outcome_of(cell: Cell, results: Sequence[EpisodeResult]) -> Outcome:
+def outcome_of(cell: Cell, results: Sequence[EpisodeResult]) -> CellOutcome:
     """What the finished episodes of a cell came to.
 
     Raises:
@@ -101,7 +101,7 @@ def outcome_of(cell: Cell, results: Sequence[EpisodeResult]) -> Outcome:
     specs, metrics = zip(*done, strict=True)
     time = np.array([one.completion_time for one in metrics])
     difficulty = np.array([one.index_of_difficulty for one in metrics])
-    return Outcome(
+    return CellOutcome(
         cell=cell,
         person=np.array([spec.practice for spec in specs]),
         cable_length=np.array([spec.start["cable_length"] for spec in specs]),
@@ -116,7 +116,9 @@ def outcome_of(cell: Cell, results: Sequence[EpisodeResult]) -> Outcome:
     )
 
 
-def paired_times(first: Outcome, second: Outcome, rng: np.random.Generator) -> PairedDifference:
+def paired_times(
+    first: CellOutcome, second: CellOutcome, rng: np.random.Generator
+) -> PairedDifference:
     """How the first cell's times differ from the second's, person by person.
 
     Raises:

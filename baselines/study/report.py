@@ -14,7 +14,7 @@ from baselines.evaluation.statistics import Interval
 from baselines.evaluation.tables import markdown_table
 from baselines.study.difficulty import Fit, fit_line
 from baselines.study.oscillation import OSCILLATING
-from baselines.study.outcome import LENGTH_EDGES, Outcome, paired_times
+from baselines.study.outcome import LENGTH_EDGES, CellOutcome, paired_times
 from baselines.study.plan import TIME_LIMIT
 
 BASELINE = "adaptive"
@@ -37,8 +37,8 @@ class Varied:
 
     field: str
     value: float
-    outcome: Outcome
-    own: Outcome
+    outcome: CellOutcome
+    own: CellOutcome
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,14 @@ class Findings:
         varied: the sensitivity to what was assumed; may be empty.
     """
 
-    outcomes: Sequence[Outcome]
+    outcomes: Sequence[CellOutcome]
     errors: Mapping[str, float]
     waits: Sequence[float]
     run_outs: Sequence[float]
     oscillation: NDArray[np.float64]
     varied: Sequence[Varied] = ()
 
-    def of(self, skill: str, family: str) -> list[Outcome]:
+    def of(self, skill: str, family: str) -> list[CellOutcome]:
         """The cells of one skill and family, one a controller."""
         return [
             one for one in self.outcomes if one.cell.skill == skill and one.cell.family == family
@@ -117,7 +117,7 @@ def markdown_report(findings: Findings) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def cell_table(outcomes: Sequence[Outcome]) -> str:
+def cell_table(outcomes: Sequence[CellOutcome]) -> str:
     """One row a controller."""
     baseline = next((one for one in outcomes if one.cell.controller == BASELINE), None)
     rng = np.random.default_rng(RESAMPLING_SEED)

@@ -20,7 +20,7 @@ from baselines.evaluation.episode_spec import Setup
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.paper.checks import Finding
 from baselines.paper.claims import CLAIMS
-from baselines.paper.design import Outcome, Screening, Turn, outcome
+from baselines.paper.design import ReadingOutcome, Screening, Turn, outcome
 from baselines.paper.evidence import measured_indices, steady_manoeuvre, tracking
 from baselines.paper.readings import DEFAULT, Reading
 from baselines.paper.report import markdown_report, plain_data
@@ -187,7 +187,7 @@ def test_shares_count_the_manoeuvres_that_meet_a_claim() -> None:
 def reproduced() -> Reproduction:
     other = ZERO
     turned = dataclasses.replace(scaled(AGREEING, "linear", "IAE", 0.5), setup=other.setup)
-    walk: tuple[Outcome, ...] = (outcome(DEFAULT, AGREEING), outcome(other, turned))
+    walk: tuple[ReadingOutcome, ...] = (outcome(DEFAULT, AGREEING), outcome(other, turned))
     again = ((DEFAULT, AGREEING), (other, turned))
     return Reproduction(AGREEING, Screening((walk,), ()), again, repeat=AGREEING)
 

@@ -39,7 +39,7 @@ class Sway(NamedTuple):
     rate: float = 0.0
 
 
-class Turn(NamedTuple):
+class SwayTurn(NamedTuple):
     """What turns the model in a control period: plain numbers, which compiled code takes as well.
 
     Attributes:
@@ -55,7 +55,7 @@ class Turn(NamedTuple):
     sine: float
 
 
-def turned(angle: float, rate: float, acceleration: float, turn: Turn) -> tuple[float, float]:
+def turned(angle: float, rate: float, acceleration: float, turn: SwayTurn) -> tuple[float, float]:
     """Sway angle [rad] and rate [rad/s] of the model a control period later.
 
     Args:
@@ -92,7 +92,7 @@ class SwayModel:
         self._length = settings.model_cable_length
         omega = math.sqrt(crane.gravity / self._length)
         angle = omega * crane.control_period
-        self.turn = Turn(crane.gravity, omega, math.cos(angle), math.sin(angle))
+        self.turn = SwayTurn(crane.gravity, omega, math.cos(angle), math.sin(angle))
 
     def after(self, sway: Sway, acceleration: float) -> Sway:
         """Sway a control period later under an acceleration of the trolley [m/s^2]."""
