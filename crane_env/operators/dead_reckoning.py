@@ -29,6 +29,19 @@ LARGEST_MARGIN_SHARE = 0.25
 """Margins take at most this share of an axis on either side, so that a short axis stays usable."""
 
 
+def press_for(distance: float, speed: float, acceleration: float) -> float:
+    """D^-1: duration of the press from rest that covers a distance, the stop included [s].
+
+    Args:
+        distance: at least 0 [m].
+        speed: V [m/s].
+        acceleration: a [m/s^2], may be infinite.
+    """
+    if distance >= speed * speed / acceleration:
+        return distance / speed
+    return math.sqrt(distance / acceleration)
+
+
 @dataclass(frozen=True)
 class Axis:
     """An axis of the crane as reckoned: ramps and the range in which to stay.
@@ -71,10 +84,7 @@ class Axis:
         distance = room + 0.5 * rate * rate / self.acceleration
         if distance <= 0.0:
             return 0.0
-        if distance >= self.speed * self.speed / self.acceleration:
-            duration = distance / self.speed
-        else:
-            duration = math.sqrt(distance / self.acceleration)
+        duration = press_for(distance, self.speed, self.acceleration)
         return max(duration - direction * rate / self.acceleration, 0.0)
 
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 
+from crane_env.operators.dead_reckoning import press_for
 from crane_env.operators.person.mind import ACCEPTED, Mind
 from crane_env.operators.person.swing import (
     catching_press,
-    displacing_press,
     free_swing,
     period_of,
     press_centre,
@@ -54,7 +54,7 @@ def _way_of_catching(mind: Mind, now: float) -> float:
     """How far the trolley will go on after a release, to stop or to catch what swings then [m]."""
     seen = mind.seen(now)
     frequency = swing_frequency(mind.parameters, seen.depth)
-    if mind.person.releases_in_steps and _steps_are_possible(mind, seen.depth):
+    if _steps(mind, seen.depth) is not None:
         return mind.parameters.travel_speed * math.pi / 3.0 / frequency
     return mind.awareness * abs(complex(seen.lean, -seen.speed / frequency))
 
@@ -157,7 +157,8 @@ def cross(mind: Mind, now: float, gap: float, direction: int, interval: float) -
     """Sets out to cross a gap [m]; returns after how long to decide again [s]."""
     depth = mind.seen(now).depth
     period = period_of(swing_frequency(mind.parameters, depth))
-    half = displacing_press(0.5 * gap, mind.parameters)
+    crane = mind.parameters
+    half = press_for(0.5 * gap, crane.travel_speed, crane.acceleration_max)
     if half > LONGEST_HALF_PRESS * period:
         start = _in_steps(mind, now, 0, direction, depth)
         mind.travels(direction, *start)
@@ -169,18 +170,20 @@ def cross(mind: Mind, now: float, gap: float, direction: int, interval: float) -
     return end - now + interval
 
 
-def _steps_are_possible(mind: Mind, depth: float) -> bool:
+def _steps(mind: Mind, depth: float) -> float | None:
+    """A sixth of the swing's period [s]; None for who does not, or cannot, stop in steps."""
     sixth = period_of(swing_frequency(mind.parameters, depth)) / 6.0
-    return mind.person.releases_in_steps and sixth > ramp_time(mind.parameters)
+    possible = mind.person.releases_in_steps and sixth > ramp_time(mind.parameters)
+    return sixth if possible else None
 
 
 def _in_steps(
     mind: Mind, at: float, before: int, after: int, depth: float
 ) -> list[tuple[float, int]]:
     """Changes of the thumb from one direction to another: three, or one where steps cannot be."""
-    if not _steps_are_possible(mind, depth):
+    sixth = _steps(mind, depth)
+    if sixth is None:
         return [(at, after)]
-    sixth = period_of(swing_frequency(mind.parameters, depth)) / 6.0
     return [
         (at, after),
         (at + mind.pressed_for(sixth), before),

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from crane_env.operators.person.belief import Belief
 from crane_env.operators.person.person import Person
 from crane_env.operators.person.sight import Sight
-from crane_env.operators.person.swing import swing_frequency
+from crane_env.operators.person.swing import period_of, swing_frequency
 from crane_env.parameters import CraneParameters
 
 SLOWEST = 0.05
@@ -61,7 +60,7 @@ class Experience:
         if self.release is None or self._swing_judged:
             return
         depth = self.sight.understood(now, 1)[0].depth
-        period = 2.0 * math.pi / swing_frequency(self._parameters, depth)
+        period = period_of(swing_frequency(self._parameters, depth))
         begin = self.release.time
         if now < begin + period:
             return

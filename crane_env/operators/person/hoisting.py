@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from crane_env.operators.dead_reckoning import press_for
 from crane_env.operators.person.mind import Mind
 from crane_env.operators.person.sight import Glance
 from crane_env.tasks.task import Goal, Obstacle, Task
@@ -40,7 +41,7 @@ def work_the_hoist(
     if abs(gap) > 2.0 * speed * (stopping + interval):
         mind.hoist.intend((now, direction))
     elif calm or mind.travel.holds:
-        duration = mind.pressed_for(_press_for(mind, abs(gap)))
+        duration = mind.pressed_for(press_for(abs(gap), speed, parameters.hoist_acceleration))
         _let_go(mind, now + duration, (now, direction))
     return may_travel
 
@@ -51,12 +52,6 @@ def _let_go(mind: Mind, end: float, *before: tuple[float, int]) -> None:
     person = mind.person
     late = person.visual_delay + person.glance_interval
     mind.hoist_seen_from = end + mind.parameters.hoist_ramp_time + late
-
-
-def _press_for(mind: Mind, distance: float) -> float:
-    """Duration of a press that hoists or lowers by a distance [s]."""
-    speed, ramp = mind.parameters.hoist_speed, mind.parameters.hoist_ramp_time
-    return math.sqrt(distance * ramp / speed) if distance < speed * ramp else distance / speed
 
 
 def _wanted_depth(

@@ -82,17 +82,6 @@ def press_centred_at(time: float, parameters: CraneParameters) -> float:
     return max(time, 2.0 * time - ramp_time(parameters))
 
 
-def displacing_press(distance: float, parameters: CraneParameters) -> float:
-    """T of the press that moves the trolley of a crane without help by a distance [s].
-
-    D(T) = a T^2 below the ramp's duration V / a and V T beyond; see `dead_reckoning`.
-    """
-    speed, acceleration = parameters.travel_speed, parameters.acceleration_max
-    if distance < speed * speed / acceleration:
-        return math.sqrt(distance / acceleration)
-    return distance / speed
-
-
 def free_swing(
     swing: complex, frequency: float, pull: float, seen: float, stands: float, at: float
 ) -> complex:

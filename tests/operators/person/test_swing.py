@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from crane_env.operators.dead_reckoning import press_for
 from crane_env.operators.person.swing import (
     catching_press,
-    displacing_press,
     free_swing,
     press_centre,
     press_centred_at,
@@ -56,7 +56,9 @@ def test_a_press_moves_the_suspension_of_a_swing_as_the_closed_form_says(
 def test_a_press_displaces_the_trolley_by_the_way_it_was_meant_for(
     crane: CraneParameters, distance: float
 ) -> None:
-    _, way = left_by_press(displacing_press(distance, crane), 1.0, crane)
+    _, way = left_by_press(
+        press_for(distance, crane.travel_speed, crane.acceleration_max), 1.0, crane
+    )
     assert way == pytest.approx(distance, rel=0.02, abs=2e-3)
 
 
