@@ -31,7 +31,14 @@ from baselines.study.figures import (
 from baselines.study.oscillation import oscillation_map
 from baselines.study.outcome import outcome_of, paired_times
 from baselines.study.plan import TIME_LIMIT, Cell, all_cells, cell_specs
-from baselines.study.report import BASELINE, Findings, Varied, markdown_report, ranks
+from baselines.study.report import (
+    BASELINE,
+    RESAMPLING_SEED,
+    Findings,
+    Varied,
+    markdown_report,
+    ranks,
+)
 from baselines.study.sensitivity import variations
 from crane_env.operators.person.person import PERSONS, TRAINED
 from crane_env.operators.registry import operator_program
@@ -216,12 +223,13 @@ def findings(study: Study, results: dict[str, EpisodeResult]) -> Findings:
         return [results[spec.key] for spec in study.specs[key]]
 
     own = [outcome_of(cell, of(f"own {place}")) for place, cell in enumerate(study.cells)]
-    varied = []
+    varied, rng = [], np.random.default_rng(RESAMPLING_SEED)
     for place, (field, value, cell) in enumerate(study.varied):
         whole_cell = study.cells.index(cell._replace(operator=operator_program(TRAINED.name)))
         unchanged = of(f"own {whole_cell}")[: len(study.few)]
         changed = outcome_of(cell, of(f"varied {place}"))
-        varied.append(Varied(field, value, changed, outcome_of(cell, unchanged)))
+        change = paired_times(changed, outcome_of(cell, unchanged), rng)
+        varied.append(Varied(field, value, changed, change))
     errors = index_values([results[spec.key] for spec in study.table], "IAE")
     return Findings(
         outcomes=own,
@@ -247,11 +255,9 @@ def figures(found: Findings, folder: ResultsFolder) -> dict[Path, Callable[[], F
         ),
     }
     if found.varied:
-        rng = np.random.default_rng(0)
-        pairs = {
-            f"{one.field} = {one.value:g}": paired_times(one.outcome, one.own, rng)
+        changes = {
+            f"{one.field} = {one.value:g}": (one.change.mean, *one.change.interval)
             for one in found.varied
         }
-        changes = {label: (pair.mean, *pair.interval) for label, pair in pairs.items()}
         drawn[folder.figures / "sensitivity"] = lambda: sensitivity_figure(changes)
     return drawn

@@ -61,20 +61,17 @@ class CellOutcome:
     @property
     def completion(self) -> tuple[float, Interval]:
         """Share of completed tasks and its interval (Wilson's, over the tasks)."""
-        done = int(self.completed.sum())
-        return done / len(self.completed), share_interval(done, len(self.completed))
+        return _share(self.completed)
 
     @property
     def collision(self) -> tuple[float, Interval]:
         """Share of episodes with a collision and its interval (Wilson's, over the tasks)."""
-        count = int(self.collided.sum())
-        return count / len(self.collided), share_interval(count, len(self.collided))
+        return _share(self.collided)
 
     @property
     def oscillation(self) -> tuple[float, Interval]:
         """Share of oscillating episodes and its interval (Wilson's, over the tasks)."""
-        count = int(self.oscillating.sum())
-        return count / len(self.oscillating), share_interval(count, len(self.oscillating))
+        return _share(self.oscillating)
 
     def time_interval(self, rng: np.random.Generator) -> Interval:
         """Interval of the mean time [s], over the persons."""
@@ -87,6 +84,11 @@ class CellOutcome:
     def at_lengths(self, low: float, high: float) -> NDArray[np.bool_]:
         """Which episodes began with a cable from `low` to before `high` [m]."""
         return (self.cable_length >= low) & (self.cable_length < high)
+
+
+def _share(flags: NDArray[np.bool_]) -> tuple[float, Interval]:
+    count = int(flags.sum())
+    return count / len(flags), share_interval(count, len(flags))
 
 
 def outcome_of(cell: Cell, results: Sequence[EpisodeResult]) -> CellOutcome:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.evaluation.provenance import machine, package_versions
-from baselines.evaluation.statistics import Interval
+from baselines.evaluation.statistics import Interval, PairedDifference
 from baselines.evaluation.tables import markdown_table
 from baselines.study.difficulty import Fit, fit_line
 from baselines.study.oscillation import OSCILLATING
@@ -26,19 +26,19 @@ RESAMPLING_SEED = 20
 
 @dataclass(frozen=True)
 class Varied:
-    """A cell with one number of the person changed, and the same cell without.
+    """A cell with one number of the person changed, held against the same cell without.
 
     Attributes:
         field: of `Person`.
         value: in place of the person's own.
         outcome: with it.
-        own: without.
+        change: of the time by it.
     """
 
     field: str
     value: float
     outcome: CellOutcome
-    own: CellOutcome
+    change: PairedDifference
 
 
 @dataclass(frozen=True)
@@ -194,16 +194,14 @@ def map_table(findings: Findings) -> str:
 
 def varied_table(varied: Sequence[Varied]) -> str:
     """What each changed number makes of completion and time."""
-    rng = np.random.default_rng(RESAMPLING_SEED)
     rows = []
     for one in varied:
-        pair = paired_times(one.outcome, one.own, rng)
         rows.append(
             (
                 f"`{one.field}`",
                 f"{one.value:g}",
                 share(*one.outcome.completion),
-                f"{pair.mean:+.1f} {shown(pair.interval, 1)}",
+                f"{one.change.mean:+.1f} {shown(one.change.interval, 1)}",
                 share(*one.outcome.oscillation),
             )
         )
