@@ -28,18 +28,19 @@ from baselines.study.figures import (
     rank_figure,
     sensitivity_figure,
 )
-from baselines.study.oscillation import oscillation_map
-from baselines.study.outcome import outcome_of, paired_times
-from baselines.study.plan import TIME_LIMIT, Cell, all_cells, cell_specs
-from baselines.study.report import (
+from baselines.study.findings import (
     BASELINE,
     RESAMPLING_SEED,
+    UNAIDED,
     Findings,
     Varied,
-    markdown_report,
     ranks,
 )
-from baselines.study.sensitivity import variations
+from baselines.study.oscillation import oscillation_map
+from baselines.study.outcome import CellOutcome, outcome_of, paired
+from baselines.study.plan import TIME_LIMIT, Cell, all_cells, cell_specs
+from baselines.study.report import markdown_report
+from baselines.study.sensitivity import Variation, delays, variations
 from crane_env.operators.person.person import PERSONS, TRAINED
 from crane_env.operators.registry import operator_program
 from crane_env.operators.table1 import TABLE_1
@@ -110,31 +111,34 @@ class Study:
 
     Attributes:
         cells: the study's own.
-        varied: cells with one number of the person changed: its field and value.
+        varied: cells of `BASELINE` with one number of the person changed.
+        delayed: cells with and without help, of persons who see late.
         seeds: of the tasks.
-        few: of the tasks of the varied cells.
+        few: of the tasks of the varied and delayed cells.
         table: the manoeuvres of Table I.
         setup: of the tasks.
         tasks_per_person: after one practice session.
     """
 
     cells: Sequence[Cell]
-    varied: Sequence[tuple[str, float, Cell]]
+    varied: Sequence[tuple[Variation, Cell]]
+    delayed: Sequence[tuple[Variation, Cell]]
     seeds: Sequence[int]
     few: Sequence[int]
     table: Sequence[EpisodeSpec]
     setup: Setup
     tasks_per_person: int
 
-    @functools.cached_property
-    def specs(self) -> dict[str, list[EpisodeSpec]]:
-        """The episodes of each cell, by the cell's place in the study."""
-        own = {f"own {place}": (cell, self.seeds) for place, cell in enumerate(self.cells)}
-        varied = {f"varied {i}": (cell, self.few) for i, (_, _, cell) in enumerate(self.varied)}
-        return {
-            key: cell_specs(cell, seeds, self.setup, self.tasks_per_person)
-            for key, (cell, seeds) in {**own, **varied}.items()
-        }
+    def episodes(self, cell: Cell) -> list[EpisodeSpec]:
+        """The episodes of a cell: all of the study's own, few of the others."""
+        seeds = self.seeds if cell in self.cells else self.few
+        return cell_specs(cell, seeds, self.setup, self.tasks_per_person)
+
+    def all_episodes(self) -> list[EpisodeSpec]:
+        """Every episode, once."""
+        others = [cell for _, cell in (*self.varied, *self.delayed)]
+        found = itertools.chain(self.table, *map(self.episodes, (*self.cells, *others)))
+        return list({spec.key: spec for spec in found}.values())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -167,11 +171,17 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     skills = [operator_program(PERSONS[skill].name) for skill in dict.fromkeys(options.skills)]
     table = [f"table1:{number}" for number in range(1, len(TABLE_1) + 1)]
     vary = options.sensitivity and BASELINE in names and TRAINED.skill in options.skills
+    family = options.tasks[0]
     study = Study(
         cells=all_cells(names, skills, list(dict.fromkeys(options.tasks))),
         varied=[
-            (one.field, one.value, Cell(BASELINE, one.operator, options.tasks[0]))
+            (one, Cell(BASELINE, one.operator, family))
             for one in (variations(TRAINED) if vary else ())
+        ],
+        delayed=[
+            (one, Cell(name, one.operator, family))
+            for one in (delays(TRAINED) if vary and UNAIDED in names else ())
+            for name in (UNAIDED, BASELINE)
         ],
         seeds=seeds,
         few=seeds[: max(len(seeds) // 5, 2 * together)],
@@ -199,8 +209,7 @@ def perform(
     Raises:
         FailedError: some tasks or figures failed.
     """
-    specs = [*study.table, *(spec for some in study.specs.values() for spec in some)]
-    specs = list({spec.key: spec for spec in specs}.values())
+    specs = study.all_episodes()
     with progress("Tasks", len(specs)) as advance:
         played = compare(
             specs, folder, jobs=jobs, keep="metrics", command=command, on_result=advance
@@ -219,20 +228,23 @@ def perform(
 def findings(study: Study, results: dict[str, EpisodeResult]) -> Findings:
     """What the results say."""
 
-    def of(key: str) -> list[EpisodeResult]:
-        return [results[spec.key] for spec in study.specs[key]]
+    def of(cell: Cell, count: int | None = None) -> CellOutcome:
+        specs = study.episodes(cell)[:count]
+        return outcome_of(cell, [results[spec.key] for spec in specs])
 
-    own = [outcome_of(cell, of(f"own {place}")) for place, cell in enumerate(study.cells)]
-    varied, rng = [], np.random.default_rng(RESAMPLING_SEED)
-    for place, (field, value, cell) in enumerate(study.varied):
-        whole_cell = study.cells.index(cell._replace(operator=operator_program(TRAINED.name)))
-        unchanged = of(f"own {whole_cell}")[: len(study.few)]
-        changed = outcome_of(cell, of(f"varied {place}"))
-        change = paired_times(changed, outcome_of(cell, unchanged), rng)
-        varied.append(Varied(field, value, changed, change))
+    rng, few = np.random.default_rng(RESAMPLING_SEED), len(study.few)
+    varied = []
+    for variation, cell in study.varied:
+        changed, unchanged = of(cell), of(as_trained(cell), few)
+        change = paired(changed, unchanged, "time", rng)
+        varied.append(Varied(variation.field, variation.value, changed, change))
+    late: dict[float, dict[str, CellOutcome]] = {}
+    for variation, cell in study.delayed:
+        late.setdefault(TRAINED.visual_delay, {})[cell.controller] = of(as_trained(cell), few)
+        late.setdefault(variation.value, {})[cell.controller] = of(cell)
     errors = index_values([results[spec.key] for spec in study.table], "IAE")
     return Findings(
-        outcomes=own,
+        outcomes=[of(cell) for cell in study.cells],
         errors={
             name: float(np.mean(np.concatenate(list(row.values())))) for name, row in errors.items()
         },
@@ -240,7 +252,16 @@ def findings(study: Study, results: dict[str, EpisodeResult]) -> Findings:
         run_outs=RUN_OUTS,
         oscillation=oscillation_map(TRAINED, WAITS, RUN_OUTS, MAP_EPISODES),
         varied=varied,
+        help_by_delay={
+            delay: paired(cells[UNAIDED], cells[BASELINE], "time", rng)
+            for delay, cells in sorted(late.items())
+        },
     )
+
+
+def as_trained(cell: Cell) -> Cell:
+    """The study's own cell that a varied one is held against."""
+    return cell._replace(operator=operator_program(TRAINED.name))
 
 
 def figures(found: Findings, folder: ResultsFolder) -> dict[Path, Callable[[], Figure]]:

@@ -38,15 +38,14 @@ def difficulty_figure(outcomes: Sequence[CellOutcome]) -> Figure:
     styles = controller_styles(outcome.cell.controller for outcome in outcomes)
     for outcome in outcomes:
         done = outcome.completed
-        fit = fit_line(outcome.difficulty[done], outcome.time[done])
-        if fit is None:
-            continue
         name, order = outcome.cell.controller, np.argsort(outcome.difficulty[done])
         groups = [group for group in np.array_split(order, BINS) if group.size]
         x = np.array([outcome.difficulty[done][group].mean() for group in groups])
         y = np.array([outcome.time[done][group].mean() for group in groups])
         axes.errorbar(x, y, None, **styles[name].mark(), label=name)
-        axes.plot(x, fit.intercept + fit.slope * x, **styles[name].line)
+        fit = fit_line(outcome.difficulty[done], outcome.time[done])
+        if fit is not None:
+            axes.plot(x, fit.intercept + fit.slope * x, **styles[name].line)
     axes.set_xlabel("index of difficulty log2(2 D / W) [bit]")
     axes.set_ylim(bottom=0.0)
     legend_above(figure, [axes])

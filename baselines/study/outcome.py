@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +78,7 @@ class CellOutcome:
         """Interval of the mean time [s], over the persons."""
         return mean_interval(self.by_person(self.time), rng)
 
-    def by_person(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def by_person(self, values: NDArray[Any]) -> NDArray[np.float64]:
         """Mean of each person, in the order of their numbers."""
         return np.array([values[self.person == one].mean() for one in np.unique(self.person)])
 
@@ -118,12 +119,16 @@ def outcome_of(cell: Cell, results: Sequence[EpisodeResult]) -> CellOutcome:
     )
 
 
-def paired_times(
-    first: CellOutcome, second: CellOutcome, rng: np.random.Generator
+def paired(
+    first: CellOutcome,
+    second: CellOutcome,
+    index: Literal["time", "presses", "collided"],
+    rng: np.random.Generator,
 ) -> PairedDifference:
-    """How the first cell's times differ from the second's, person by person.
+    """How the first cell's index differs from the second's, person by person.
 
     Raises:
         ValueError: the cells have not the same episodes.
     """
-    return paired_difference(first.by_person(first.time), second.by_person(second.time), rng)
+    one, other = (cell.by_person(getattr(cell, index)) for cell in (first, second))
+    return paired_difference(one, other, rng)

@@ -3,91 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.evaluation.provenance import machine, package_versions
-from baselines.evaluation.statistics import Interval, PairedDifference
+from baselines.evaluation.statistics import Interval
 from baselines.evaluation.tables import markdown_table
 from baselines.study.difficulty import Fit, fit_line
+from baselines.study.findings import BASELINE, RESAMPLING_SEED, Findings, Varied, ranks
 from baselines.study.oscillation import OSCILLATING
-from baselines.study.outcome import LENGTH_EDGES, CellOutcome, paired_times
+from baselines.study.outcome import LENGTH_EDGES, CellOutcome, paired
 from baselines.study.plan import TIME_LIMIT
-
-BASELINE = "adaptive"
-"""Controller that the others are compared with, where it takes part."""
-
-RESAMPLING_SEED = 20
-"""Of the bootstrap intervals."""
-
-
-@dataclass(frozen=True)
-class Varied:
-    """A cell with one number of the person changed, held against the same cell without.
-
-    Attributes:
-        field: of `Person`.
-        value: in place of the person's own.
-        outcome: with it.
-        change: of the time by it.
-    """
-
-    field: str
-    value: float
-    outcome: CellOutcome
-    change: PairedDifference
-
-
-@dataclass(frozen=True)
-class Findings:
-    """All that the study found.
-
-    Attributes:
-        outcomes: of its cells.
-        errors: mean IAE on Table I of each controller [m].
-        waits: of the map, shares of the run-out.
-        run_outs: of the map [s].
-        oscillation: the map, shape (run-outs, waits).
-        varied: the sensitivity to what was assumed; may be empty.
-    """
-
-    outcomes: Sequence[CellOutcome]
-    errors: Mapping[str, float]
-    waits: Sequence[float]
-    run_outs: Sequence[float]
-    oscillation: NDArray[np.float64]
-    varied: Sequence[Varied] = ()
-
-    def of(self, skill: str, family: str) -> list[CellOutcome]:
-        """The cells of one skill and family, one a controller."""
-        return [
-            one for one in self.outcomes if one.cell.skill == skill and one.cell.family == family
-        ]
-
-    @property
-    def skills(self) -> list[str]:
-        """In the order in which they were asked for."""
-        return list(dict.fromkeys(one.cell.skill for one in self.outcomes))
-
-    @property
-    def families(self) -> list[str]:
-        """Of tasks, likewise."""
-        return list(dict.fromkeys(one.cell.family for one in self.outcomes))
-
-
-def ranks(findings: Findings, family: str) -> dict[str, dict[str, int]]:
-    """Rank of each controller, from 1: by IAE on Table I, and by mean time for each skill."""
-    measures: dict[str, dict[str, float]] = {"IAE": dict(findings.errors)}
-    for skill in findings.skills:
-        cells = findings.of(skill, family)
-        measures[skill] = {one.cell.controller: float(one.time.mean()) for one in cells}
-    return {
-        measure: {name: place for place, name in enumerate(sorted(row, key=row.__getitem__), 1)}
-        for measure, row in measures.items()
-    }
+from baselines.study.published import PUBLISHED, directions
 
 
 def markdown_report(findings: Findings) -> str:
@@ -109,6 +37,13 @@ def markdown_report(findings: Findings) -> str:
             fit_table(findings, family),
         ]
     parts += ["## Oscillation", MAP, map_table(findings)]
+    if compared := directions(findings):
+        rows = [(one.direction, one.found, one.verdict) for one in compared]
+        parts += [
+            "## What is published",
+            PUBLISHED,
+            markdown_table(("published", "here", ""), rows),
+        ]
     if findings.varied:
         parts += ["## Sensitivity to what was assumed", SENSITIVITY, varied_table(findings.varied)]
     machine_facts = ", ".join(f"{key} {value}" for key, value in machine().items())
@@ -125,7 +60,7 @@ def cell_table(outcomes: Sequence[CellOutcome]) -> str:
     for one in outcomes:
         difference = "-"
         if baseline is not None and one is not baseline:
-            pair = paired_times(one, baseline, rng)
+            pair = paired(one, baseline, "time", rng)
             difference = f"{pair.mean:+.1f} {shown(pair.interval, 1)}"
         rows.append(
             (

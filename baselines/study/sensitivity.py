@@ -40,6 +40,10 @@ BOUNDS = {"awareness": 1.0, "patience_gain": 1.0}
 """Where half or twice is no person: awareness ends at 1, the gain of patience begins there."""
 
 
+DELAYS = (0.5, 0.75)
+"""Visual delays beside a person's own, as of who looks through a camera [s]."""
+
+
 class Variation(NamedTuple):
     """A person with one number changed.
 
@@ -56,7 +60,6 @@ class Variation(NamedTuple):
 
 def variations(person: Person) -> Iterator[Variation]:
     """Every number that can be varied, halved and doubled."""
-    described = {**dataclasses.asdict(person), "name": person.name}
     for field in (*ASSUMED, *MEASURED):
         own = getattr(person, field)
         for factor in FACTORS:
@@ -66,4 +69,14 @@ def variations(person: Person) -> Iterator[Variation]:
             if isinstance(own, int):
                 value = round(value)
             if value != own:
-                yield Variation(field, value, {**described, field: value})
+                yield _variation(person, field, value)
+
+
+def delays(person: Person) -> Iterator[Variation]:
+    """The same person, to whom the payload is shown later."""
+    return (_variation(person, "visual_delay", delay) for delay in DELAYS)
+
+
+def _variation(person: Person, field: str, value: float) -> Variation:
+    described = {**dataclasses.asdict(person), "name": person.name, field: value}
+    return Variation(field, value, described)

@@ -12,7 +12,7 @@ from baselines.commands import study
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, play
 from baselines.evaluation.results import EpisodeResult
 from baselines.study.difficulty import fit_line
-from baselines.study.outcome import outcome_of, paired_times
+from baselines.study.outcome import outcome_of, paired
 from baselines.study.plan import CABLE_LENGTHS, TIME_LIMIT, Cell, cable_length, cell_specs
 from baselines.study.sensitivity import ASSUMED, MEASURED, variations
 from crane_env import CraneParameters, Person
@@ -75,7 +75,7 @@ def test_a_task_that_was_not_done_counts_with_the_time_limit() -> None:
             for spec in specs
         ],
     )
-    pair = paired_times(found, faster, np.random.default_rng(0))
+    pair = paired(found, faster, "time", np.random.default_rng(0))
     assert pair.count == 2
     assert pair.mean == pytest.approx(45.0)
     lost = [EpisodeResult(spec, None, 0.1, failure="lost") for spec in specs]
@@ -116,14 +116,17 @@ def test_a_small_study_writes_its_report_figures_and_metrics_and_goes_on_from_th
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(study, "MAP_EPISODES", 2)
-    arguments = ["--controllers", "manual", "lqr", "--skills", "trained", "--seeds", "0:4"]
-    arguments += ["--tasks-per-person", "2", "--no-sensitivity", "--jobs", "1"]
-    arguments += ["--output", str(tmp_path)]
+    monkeypatch.setattr(study, "variations", lambda person: [*variations(person)][-1:])
+    arguments = ["--controllers", "manual", "adaptive", "--skills", "trained", "--seeds", "0:2"]
+    arguments += ["--tasks-per-person", "1", "--jobs", "1", "--output", str(tmp_path)]
     assert study.main(arguments) == 0
     report = (tmp_path / "report.md").read_text(encoding="utf-8")
-    assert "| `lqr` " in report
+    assert "| `adaptive` " in report
+    assert "| `refractory_swinging` " in report
+    assert report.count("help cuts the time") == 1
+    assert "s at 0.25 s, " in report  # without added delay, as much as in the study's own cells
     drawn = {file.name for file in (tmp_path / "figures").iterdir()}
-    assert drawn == {"difficulty.png", "ranks.png", "oscillation.png"}
+    assert drawn == {"difficulty.png", "ranks.png", "oscillation.png", "sensitivity.png"}
     assert study.main(arguments) == 0
     assert (tmp_path / "report.md").read_text(encoding="utf-8") == report
     capsys.readouterr()

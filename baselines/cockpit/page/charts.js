@@ -1,5 +1,7 @@
 // Charts: the last twelve seconds on strips, each with limits that grow in steps.
 
+import { fitted } from "./canvas.js";
+
 const SHOWN = 12; // [s]
 const LEFT = 30; // room for the labels [px]
 const DEGREES = 180 / Math.PI;
@@ -22,17 +24,7 @@ export class Chart {
     this.canvas = canvas;
     this.kind = CHARTS[canvas.dataset.chart];
     this.context = canvas.getContext("2d");
-    new ResizeObserver(() => this.resize()).observe(canvas);
-    this.resize();
-  }
-
-  resize() {
-    const ratio = window.devicePixelRatio || 1;
-    this.width = this.canvas.clientWidth;
-    this.height = this.canvas.clientHeight;
-    this.canvas.width = Math.round(this.width * ratio);
-    this.canvas.height = Math.round(this.height * ratio);
-    this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    fitted(this);
   }
 
   draw(states, facts, colours) {

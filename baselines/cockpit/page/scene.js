@@ -1,5 +1,7 @@
 // Scene: the crane from the side, to scale, with its goals, walls and the place where it would rest.
 
+import { fitted } from "./canvas.js";
+
 const HALL = 13.7; // from the girder to below the floor [m]
 const FLOOR = 12.6; // [m] below the girder
 const AROUND = 6.5; // shown on either side where the whole rail does not fit [m]
@@ -16,18 +18,7 @@ export class Scene {
     this.context = canvas.getContext("2d");
     this.centre = 0;
     this.facts = { rail: 20, cable: [1, 12] };
-    new ResizeObserver(() => this.resize()).observe(canvas);
-    this.resize();
-  }
-
-  resize() {
-    const ratio = window.devicePixelRatio || 1;
-    this.width = this.canvas.clientWidth;
-    this.height = this.canvas.clientHeight;
-    this.canvas.width = Math.round(this.width * ratio);
-    this.canvas.height = Math.round(this.height * ratio);
-    this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    this.colours = null;
+    fitted(this, () => (this.colours = null));
   }
 
   colour(name) {
