@@ -1,8 +1,8 @@
 """Domain randomisation: ranges from which each episode's crane is drawn.
 
-A quantity without a range keeps the crane's own value. Payload mass and initial length are uniform
-within their ranges; cable stiffness and drive bandwidth, which differ between cranes by factors,
-are log-uniform. The four are independent.
+A quantity without a range keeps the crane's own value. Payload mass, initial length and the
+severity of imperfections are uniform within their ranges; cable stiffness and drive bandwidth,
+which differ between cranes by factors, are log-uniform. The five are independent.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from crane_env.parameters import CraneParameters
-from crane_env.support.checks import positive_range
+from crane_env.support.checks import not_negative, number_range
 from crane_env.support.fields import check_fields, from_fields
 
 Range = tuple[float, float]
@@ -35,6 +35,7 @@ class Randomisation:
         cable_length_initial: [m], uniform.
         cable_stiffness: K_l [N], log-uniform.
         drive_bandwidth: [rad/s], log-uniform, above 0.
+        severity: multiplies the severities of all the crane's imperfections, uniform, from 0 on.
 
     Raises:
         ValueError: a range that is no pair of finite numbers in order, or not positive.
@@ -44,10 +45,13 @@ class Randomisation:
     cable_length_initial: Range | None = None
     cable_stiffness: Range | None = None
     drive_bandwidth: Range | None = None
+    severity: Range | None = None
 
     def __post_init__(self) -> None:
         """Brings the ranges into their form, or refuses them."""
-        check_fields(self, positive_range, self.ranges)
+        check_fields(self, number_range, self.ranges)
+        if self.severity is not None:
+            check_fields(self, number_range, ("severity",), not_negative)
 
     @classmethod
     def of(cls, value: Randomisation | Mapping[str, Any] | None) -> Randomisation:
@@ -65,8 +69,9 @@ class Randomisation:
 
     @property
     def ranges(self) -> dict[str, Range]:
-        """The ranges given, by name of the crane parameter."""
-        given = ((field.name, getattr(self, field.name)) for field in dataclasses.fields(self))
+        """The ranges of crane parameters that are given, by name of the parameter."""
+        names = (one.name for one in dataclasses.fields(self) if one.name != "severity")
+        given = ((name, getattr(self, name)) for name in names)
         return {name: value for name, value in given if value is not None}
 
     def check(self, parameters: CraneParameters) -> list[CraneParameters]:
@@ -103,3 +108,10 @@ class Randomisation:
                 value = low + (high - low) * share
             values[name] = min(max(value, low), high)
         return dataclasses.replace(parameters, **values) if values else parameters
+
+    def draw_severity(self, rng: np.random.Generator) -> float:
+        """Draws what multiplies the severities; 1 without a range, and nothing is drawn."""
+        if self.severity is None:
+            return 1.0
+        low, high = self.severity
+        return min(low + (high - low) * rng.random(), high)

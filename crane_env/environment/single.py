@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from crane_env.environment.options import accelerations, read_options, start_of
 from crane_env.environment.pictures import Pictures
 from crane_env.environment.report import StepRecord, report_period, report_start
+from crane_env.imperfections.base import EVERYONE, Episode, Imperfection, Moment
+from crane_env.imperfections.path import SignalPath
+from crane_env.imperfections.registry import ImperfectionSpec, make_imperfections
 from crane_env.observation import CraneState, Observation, observation_space
 from crane_env.operators.base import EVENT_TOLERANCE, RELEASED, Buttons, Operator, due_time
 from crane_env.operators.registry import OperatorSpec, own_operator
@@ -94,18 +97,27 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
     | task_success        | -      | the payload has been brought to the task's goals   | False    |
     | collision_speed     | m/s    | at which it met an obstacle, across its face, or 0 | 0        |
     | reward_tracking ... | m^2/s  | the three terms of the reward                      | 0        |
+    | truth, measurement  |        | with imperfections: as observations, shape (8,)    |          |
 
     ## Starting state
 
     At rest, payload hanging still. `reset(options=...)` may give `cable_length`, `sway_angle`,
-    `sway_rate`, `trolley_position`, `trolley_velocity` and, for that episode, an `operator` and a
-    `task`.
+    `sway_rate`, `trolley_position`, `trolley_velocity` and, for that episode, an `operator`, a
+    `task` and `imperfections`.
 
     ## Task
 
     With a task the payload is to be brought to goals, past obstacles (`crane_env.tasks`). It is
     drawn from the seed, apart from all else: the same seed without a task gives the same presses of
     an operator who does not look. One with a method `pursue`, as the persons have, is told of it.
+
+    ## Imperfections
+
+    With imperfections (`crane_env.imperfections`) what is observed is the measurement, the drives
+    are not given quite what is asked of them, and buttons may arrive late or not at all: the
+    references are those that arrived, `info["buttons"]` those that are pressed. Operator, task,
+    reward and record see the truth. What is measured stays within the observation space, where the
+    sensors saturate.
 
     ## Episode end
 
@@ -135,6 +147,8 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         cost: weights of the stage cost; `StageCost` or a mapping of its fields.
         task: None, "position", "over-wall", "bay", "sequence", a `Task`, or a mapping; see
             `make_task`.
+        imperfections: None, "field", a name, an `Imperfection`, a mapping, or a list of such; see
+            `make_imperfections`.
         render_mode: None, "human" (a window) or "rgb_array" (a picture from `render`).
         render_width: width of the picture [pixel].
         render_height: height of the picture [pixel].
@@ -155,6 +169,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         parameters: CraneParameters | Mapping[str, Any] | str | None = None,
         cost: StageCost | Mapping[str, Any] | None = None,
         task: TaskSpec = None,
+        imperfections: ImperfectionSpec = None,
         render_mode: str | None = None,
         render_width: int = 960,
         render_height: int = 720,
@@ -177,6 +192,8 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         begun = start.coordinates(self._parameters).state
         check_task(self._default_task, self._parameters, begun)
         self._judge: TaskJudge | None = None
+        self._default_imperfections = make_imperfections(imperfections)
+        self._path: SignalPath | None = None
         self._step_index = 0
         self._due = -math.inf
         self._press(RELEASED)
@@ -203,6 +220,11 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         return None if self._judge is None else self._judge.task
 
     @property
+    def imperfections(self) -> tuple[Imperfection, ...]:
+        """What is not as on paper in the present episode."""
+        return () if self._path is None else self._path.imperfections[0]
+
+    @property
     def buttons(self) -> Buttons:
         """Pressed in the present control period."""
         return self._buttons
@@ -219,18 +241,22 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         Args:
             seed: seeds the episodes from this one on, from 0 to before 2^63; operator and task are
                 part of them.
-            options: any field of `Start`, `operator` and `task`, for this episode only.
+            options: any field of `Start`, `operator`, `task` and `imperfections`, for this episode
+                only.
 
         Raises:
             ValueError: an unknown option, or a value out of range; the crane stays as it was.
         """
-        placed = read_options(options, "operator", "task")
+        placed = read_options(options, "operator", "task", "imperfections")
         operator = self._default_operator
         if "operator" in placed:
             operator = own_operator(placed.pop("operator"))
         given = self._default_task
         if "task" in placed:
             given = make_task(placed.pop("task"))
+        imperfections = self._default_imperfections
+        if "imperfections" in placed:
+            imperfections = make_imperfections(placed.pop("imperfections"))
         check_has_task(operator, given)
         parameters = self._parameters
         start = start_of(placed, operator, parameters)
@@ -250,6 +276,10 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         if task is not None:
             self._judge = TaskJudge(task, parameters.control_period)
             set_upon(self._operator, task, 0)
+        self._path = None
+        if imperfections:
+            self._path = SignalPath(1)
+            self._path.begin([0], [imperfections], [Episode(number, parameters, state)])
         self._read_buttons(state)
         info = report_start(state, tension)
         return self._show(state, info, math.nan, 0.0), info
@@ -270,13 +300,15 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
             raise ValueError(f"An action must be a finite acceleration, not {asked} m/s^2.")
         limit = self._parameters.acceleration_max
         travel_reference, hoist_reference = self._references
-        outcome = self._plant.step(min(max(asked, -limit), limit), hoist_reference)
+        command = min(max(asked, -limit), limit)
+        if self._path is not None:
+            command, hoist_reference = self._through(self._path, command, hoist_reference)
+        outcome = self._plant.step(command, hoist_reference)
         self._step_index += 1
         success = False
-        if not outcome.failed:
-            if self._judge is not None:
-                success = self._watch(self._judge, outcome.state)
-            self._read_buttons(outcome.state)
+        if not outcome.failed and self._judge is not None:
+            success = self._watch(self._judge, outcome.state)
+        self._read_buttons(outcome.state, outcome.failed)
         reward, info = report_period(
             outcome, asked, travel_reference, success, self._parameters, self._cost
         )
@@ -321,28 +353,52 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
             self._due = -math.inf
         return judge.success
 
-    def _read_buttons(self, state: CraneState) -> None:
+    def _through(
+        self, path: SignalPath, command: float, hoist_reference: float
+    ) -> tuple[float, float]:
+        """What the drives are given of an acceleration and a hoist reference."""
+        state, tension = self._plant.measure()
+        speed = self._plant.setpoint_velocity
+        now = Moment(*map(_one, (self.time, state, speed, tension)))
+        commands, references = path.drive(now, _one(command), _one(hoist_reference))
+        return commands.item(), references.item()
+
+    def _read_buttons(self, state: CraneState, failed: bool = False) -> None:
         time = self.time
-        if self._due > time + EVENT_TOLERANCE:
-            return
-        buttons = self._operator.press(time, state)
-        self._due = due_time(self._operator)
-        if buttons is not self._buttons:
-            self._press(Buttons.of(buttons))
+        if not failed and self._due <= time + EVENT_TOLERANCE:
+            buttons = self._operator.press(time, state)
+            self._due = due_time(self._operator)
+            if buttons is not self._buttons:
+                self._press(Buttons.of(buttons))
+        if self._path is not None:
+            arrived = self._path.references(
+                EVERYONE, _one(time), self._pressed[None], self._parameters
+            )
+            self._references = tuple(arrived[0].tolist())
 
     def _press(self, buttons: Buttons) -> None:
         self._buttons = buttons
         self._references = buttons.references(self._parameters)
-        self._pressed = np.array(buttons, dtype=np.bool_)
+        self._pressed: NDArray[np.bool_] = np.array(buttons, dtype=np.bool_)
 
     def _show(
         self, state: CraneState, info: dict[str, Any], asked: float, reward: float
     ) -> NDArray[np.float64]:
         """Completes the info, tells recorder and window, and makes the observation."""
         info["buttons"] = self._pressed.copy()
+        observation = np.array((*state, *self._references))
+        if self._path is not None:
+            info["truth"] = observation
+            observation = self._path.measure(EVERYONE, observation[None])[0]
+            info["measurement"] = observation.copy()
         if self._render_mode == "human":
             self.render()
         if self.recorder is not None:
             truth = Observation(*state, *self._references)
             self.recorder(StepRecord(self.time, truth, dict(info), asked, reward))
-        return np.array((*state, *self._references))
+        return observation
+
+
+def _one(value: object) -> NDArray[np.float64]:
+    """A value of one crane as that of N = 1."""
+    return np.array([value], dtype=np.float64)

@@ -30,6 +30,13 @@ from crane_env.environment.report import (
     report_period,
     report_start,
 )
+from crane_env.imperfections.base import EVERYONE, Episode, Imperfection, Moment, Which
+from crane_env.imperfections.path import SignalPath
+from crane_env.imperfections.registry import (
+    VectorImperfectionSpec,
+    make_all_imperfections,
+    scaled,
+)
 from crane_env.observation import CraneState, Observation, observation_space
 from crane_env.operators.base import Operator
 from crane_env.operators.batch import VectorOperator, VectorOperatorSpec, make_operators
@@ -69,13 +76,14 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
     episode in the step after, in the same step, or when `reset` is called with its bit set in
     `options["reset_mask"]`), `seed` an integer (crane i gets seed + i) or a list. A value among the
     reset options is for all cranes, or an array of shape (N,); `operator` and `task` may be a list
-    or tuple of N descriptions.
+    or tuple of N descriptions, `imperfections` one of N lists or tuples or None.
 
     ## Info
 
     The keys of `OILCraneEnv` in Gymnasium's vector layout: an array of shape (N,) for each key, and
     under "_" and the key the mask of the cranes that have it. `buttons` is a boolean array of shape
-    (N, 4), in the order of `Buttons`.
+    (N, 4), in the order of `Buttons`; with imperfections of any crane, `truth` and `measurement`
+    have shape (N, 8).
 
     ## Episode end
 
@@ -105,6 +113,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             payload mass, cable stiffness, initial cable length and drive bandwidth only.
         cost: weights of the stage cost; `StageCost` or a mapping of its fields.
         task: as for `OILCraneEnv`; or a list or tuple of such, one for each crane.
+        imperfections: as for `OILCraneEnv`, for all cranes; or a list or tuple of N lists, tuples
+            or None, one for each crane.
         randomisation: `Randomisation` or a mapping of its fields; None: nothing is randomised.
         max_episode_steps: control steps after which an episode is truncated; None or -1: never.
         autoreset_mode: an `AutoresetMode` or its value: "NextStep", "SameStep", "Disabled".
@@ -131,6 +141,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         parameters: CraneSpec | Sequence[CraneSpec] = None,
         cost: StageCost | Mapping[str, Any] | None = None,
         task: VectorTaskSpec = None,
+        imperfections: VectorImperfectionSpec = None,
         randomisation: Randomisation | Mapping[str, Any] | None = None,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -171,6 +182,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             self._default_tasks, self._own_parameters, self._randomisation, dict(enumerate(starts))
         )
         self._judge = VectorJudge(self.num_envs)
+        self._default_imperfections = make_all_imperfections(imperfections, self.num_envs)
+        self._check_severities(self._default_imperfections)
+        self._path: SignalPath | None = None
+        self._references = self._operator.references
+        self._measured: NDArray[np.float64] | None = None
 
         frames = max(1, round(1.0 / self._parameters.control_period))
         self.metadata = {
@@ -208,6 +224,11 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         return tuple(None if judge is None else judge.task for judge in self._judge.judges)
 
     @property
+    def imperfections(self) -> tuple[tuple[Imperfection, ...], ...]:
+        """What is not as on paper with each crane in its present episode."""
+        return ((),) * self.num_envs if self._path is None else tuple(self._path.imperfections)
+
+    @property
     def operators(self) -> tuple[Operator | None, ...]:
         """Who presses the buttons of each crane in its present episode; None before the first."""
         return self._operator.operators
@@ -227,8 +248,9 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
 
         Args:
             seed: seeds the episodes from this one on; crane i gets seed + i or entry i of a list.
-            options: any field of `Start`, `operator`, `task` and `reset_mask` (bool, shape (N,)),
-                for these episodes only; what concerns cranes out of the mask is ignored.
+            options: any field of `Start`, `operator`, `task`, `imperfections` and `reset_mask`
+                (bool, shape (N,)), for these episodes only; what concerns cranes out of the mask is
+                ignored.
 
         Returns:
             Observations, shape (N, 8), and info of the cranes that were reset.
@@ -239,7 +261,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             TypeError: a mask that is no boolean array.
             ResetNeeded: a mask, before all cranes were reset once.
         """
-        placed = read_options(options, "operator", "task", "reset_mask")
+        placed = read_options(options, "operator", "task", "imperfections", "reset_mask")
         chosen = np.ones(self.num_envs, dtype=np.bool_)
         if "reset_mask" in placed:
             chosen = chosen_by(placed.pop("reset_mask"), self.num_envs)
@@ -251,6 +273,10 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         tasks = self._default_tasks
         if "task" in placed:
             tasks = make_tasks(placed.pop("task"), self.num_envs)
+        imperfections = self._default_imperfections
+        if "imperfections" in placed:
+            imperfections = make_all_imperfections(placed.pop("imperfections"), self.num_envs)
+            self._check_severities(imperfections)
         for index in np.flatnonzero(chosen).tolist():
             check_has_task(operators[index], tasks[index])
         starts = starts_of_each(placed, chosen, operators, self._own_parameters)
@@ -267,12 +293,13 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         }
         for index, random in randoms.items():
             self._randoms[index] = random
-        self._begin(indices, operators, tasks, starts)
+        self._begin(indices, operators, tasks, imperfections, starts)
         state, tension = self._plant.measure()
-        info = self._complete(report_start(state, tension))
+        observations = self._observe(indices, state)
+        info = self._complete(report_start(state, tension), state)
         self._record(state, info, np.full(self.num_envs, np.nan), np.zeros(self.num_envs))
         infos = lay_out(info, chosen)
-        return np.column_stack((*state, self._operator.references)), infos
+        return observations, infos
 
     def step(
         self, actions: NDArray[Any]
@@ -304,14 +331,22 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         moving = ~self._ended
         asked = self._checked_actions(actions, moving)
         limit = self._parameters.acceleration_max
-        travel_reference, hoist_reference = self._operator.references.copy().T
-        outcome = self._plant.step(np.clip(asked, -limit, limit), hoist_reference, moving)
+        travel_reference, hoist_reference = self._references.copy().T
+        commands = np.clip(asked, -limit, limit)
+        if self._path is not None:
+            before, tension = self._plant.measure()
+            speeds = self._plant.setpoint_velocity
+            now = Moment(self.times, np.column_stack(before), speeds, tension)
+            commands, hoist_reference = self._path.drive(now, commands, hoist_reference)
+        outcome = self._plant.step(commands, hoist_reference, moving)
         self._step_index += moving
         states = np.column_stack(outcome.state)
         live = moving & ~outcome.failed
         for index, judge in self._judge.watch(self._step_index, states, live):
             self._operator.pursue(index, judge.task, judge.stage)
         self._operator.press(self.times, states, live)
+        self._arrive(EVERYONE)
+        observations = self._observe(EVERYONE, outcome.state)
 
         terminations = self._judge.success & live
         reward, info = report_period(
@@ -327,22 +362,22 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         beginning = ~moving
         if self._autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
             beginning = self._ended.copy()
-            last = np.concatenate((states, self._operator.references), axis=1)
-            infos |= lay_out_objects("final_obs", last, beginning)
-            infos["final_info"] = lay_out(self._complete(info), beginning)
+            infos |= lay_out_objects("final_obs", observations, beginning)
+            infos["final_info"] = lay_out(self._complete(info, outcome.state), beginning)
             infos["_final_info"] = beginning.copy()
-        state: Any = outcome.state
+        state = outcome.state
         if beginning.any():
             indices = np.flatnonzero(beginning)
             operators, cranes = self._default_operators, self._own_parameters
             starts = starts_of_each({}, beginning, operators, cranes)
-            self._begin(indices, operators, self._default_tasks, starts)
+            imperfections = self._default_imperfections
+            self._begin(indices, operators, self._default_tasks, imperfections, starts)
             state, tension = self._plant.measure()
+            observations = self._observe(indices, state)
             begun = report_start(state, tension)
             info = {key: np.where(beginning, begun[key], info[key]) for key in begun}
-        self._record(state, self._complete(info), asked, rewards)
+        self._record(state, self._complete(info, state), asked, rewards)
         infos |= lay_out(info, np.ones(self.num_envs, dtype=np.bool_))
-        observations = np.column_stack((*state, self._operator.references))
         return observations, rewards, terminations, truncations, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
@@ -360,7 +395,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             self._pictures.draw(
                 self._make_renderer,
                 operator.buttons,
-                operator.references[:, 0],
+                self._references[:, 0],
                 self._judge.judges,
             ),
         )
@@ -399,20 +434,25 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         indices: NDArray[np.intp],
         operators: Sequence[Operator],
         given: Sequence[Task | DrawnTasks | None],
+        imperfections: Sequence[tuple[Imperfection, ...]],
         starts: Sequence[Start],
     ) -> None:
         """Begins an episode of each of some cranes, where its start says."""
-        cranes, numbers, tasks = [], [], []
-        randomised = bool(self._randomisation.ranges)
+        cranes, numbers, tasks, parts = [], [], [], []
+        randomised = self._randomisation != Randomisation()
         for index, start in zip(indices.tolist(), starts, strict=True):
             # One number an episode, as `OILCraneEnv` draws it; all else is drawn from others that
             # it seeds.
             number = int(self._random(index)[0].integers(2**63))
             numbers.append(number)
-            crane = self._own_parameters[index]
+            crane, own = self._own_parameters[index], imperfections[index]
             if randomised:
-                crane = self._randomisation.draw(np.random.default_rng((number, 1)), crane)
+                rng = np.random.default_rng((number, 1))
+                crane = self._randomisation.draw(rng, crane)
+                if self._randomisation.severity is not None:
+                    own = scaled(own, self._randomisation.draw_severity(rng))
             cranes.append(crane)
+            parts.append(own)
             task = None
             if given[index] is not None:
                 task = draw_task(given[index], number, crane, start.coordinates(crane).state)
@@ -420,19 +460,52 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         self._plant.exchange(indices, cranes)
         self._plant.reset(indices, starts, [task.obstacles if task else () for task in tasks])
         states = self._plant.states()
+        if any(parts) and self._path is None:
+            self._path = SignalPath(self.num_envs)
+            self._references, self._measured = self._operator.references.copy(), None
         everything = zip(indices.tolist(), cranes, numbers, tasks, strict=True)
+        episodes = []
         for index, crane, number, task in everything:
             state = CraneState(*states[index].tolist())
             judge = None if task is None else TaskJudge(task, crane.control_period)
             self._judge.begin(index, judge)
             stream = np.random.default_rng(number)
             self._operator.reset(index, operators[index], stream, state, crane, task)
+            episodes.append(Episode(number, crane, state))
+        if self._path is not None:
+            self._path.begin(indices.tolist(), parts, episodes)
+            if not any(self._path.imperfections):
+                self._path, self._references = None, self._operator.references
         self._step_index[indices] = 0
+        self._arrive(indices)
         self._begun[indices] = True
         self._ended[indices] = False
 
-    def _complete(self, info: dict[str, Any]) -> dict[str, Any]:
+    def _arrive(self, which: Which) -> None:
+        """Lets what is pressed arrive; without imperfections it has."""
+        if self._path is not None:
+            pressed = self._operator.buttons[which]
+            self._references[which] = self._path.references(
+                which, self.times[which], pressed, self._parameters
+            )
+
+    def _observe(self, which: Which, state: CraneState) -> NDArray[np.float64]:
+        """Observations, shape (N, 8), of which only those of some cranes are made anew."""
+        truth = self._truth(state)
+        if self._path is None:
+            return truth
+        if self._measured is None:
+            self._measured = truth.copy()
+        self._measured[which] = self._path.measure(which, truth[which])
+        return self._measured.copy()
+
+    def _truth(self, state: CraneState) -> NDArray[np.float64]:
+        return np.column_stack((*state, self._references))
+
+    def _complete(self, info: dict[str, Any], state: CraneState) -> dict[str, Any]:
         info["buttons"] = self._operator.buttons.copy()
+        if self._path is not None and self._measured is not None:
+            info["truth"], info["measurement"] = self._truth(state), self._measured.copy()
         return info
 
     def _record(
@@ -443,9 +516,13 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         rewards: NDArray[np.float64],
     ) -> None:
         if self.recorder is not None:
-            truth = Observation(*state, *self._operator.references.copy().T)
+            truth = Observation(*state, *self._references.copy().T)
             own = {name: values.copy() for name, values in info.items()}
             self.recorder(StepRecord(self.times, truth, own, asked, rewards.copy()))
+
+    def _check_severities(self, imperfections: Sequence[tuple[Imperfection, ...]]) -> None:
+        for parts in set(imperfections):
+            scaled(parts, (self._randomisation.severity or (1.0, 1.0))[1])
 
     def _checked_actions(
         self, actions: NDArray[Any], moving: NDArray[np.bool_]

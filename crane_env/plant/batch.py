@@ -299,6 +299,11 @@ class VectorPlant:
         """Motion of each crane now, in the order of `CraneState`, shape (N, 6)."""
         return np.column_stack(self.measure()[0])
 
+    @property
+    def setpoint_velocity(self) -> NDArray[np.float64]:
+        """Trolley velocity that each drive asks for [m/s], shape (N,)."""
+        return self._velocity[:, SETPOINT].copy()
+
     def copy_to(self, index: int, plant: Plant) -> None:
         """Puts a plant of the same parameters into the state of one crane."""
         signature = mujoco.mjtState.mjSTATE_INTEGRATION

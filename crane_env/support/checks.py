@@ -78,20 +78,28 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
     return _where(name, value, allowed, lambda number: low <= number <= high)
 
 
-def positive_range(name: str, value: object) -> tuple[float, float]:
-    """A lowest and a highest value, both positive.
+def number_range(
+    name: str, value: object, check: Callable[[str, object], float] = positive
+) -> tuple[float, float]:
+    """A lowest and a highest value.
+
+    Args:
+        name: what the range is of, for the error.
+        value: what was given.
+        check: of both, `positive` or `not_negative`.
 
     Raises:
         ValueError: it is something else.
     """
     try:
-        low, high = (positive("Its end", end) for end in value)  # type: ignore[attr-defined]
+        low, high = (check("Its end", end) for end in value)  # type: ignore[attr-defined]
         ordered = low <= high
     except (TypeError, ValueError):
         ordered = False
     if not ordered:
+        kind = "positive" if check is positive else "zero or positive"
         raise ValueError(
-            f"{name} must be a range (low, high) of positive numbers in order, not {shown(value)}."
+            f"{name} must be a range (low, high) of {kind} numbers in order, not {shown(value)}."
         )
     return low, high
 

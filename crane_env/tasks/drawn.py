@@ -17,7 +17,7 @@ import numpy as np
 
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
-from crane_env.support.checks import choice, positive_range, whole, within
+from crane_env.support.checks import choice, number_range, whole, within
 from crane_env.support.fields import check_fields
 from crane_env.tasks.task import (
     HOLD_TIME,
@@ -67,7 +67,7 @@ class DrawnTasks(abc.ABC):
     def __post_init__(self) -> None:
         """Refuses what no task can be drawn with."""
         choice("name of this family of tasks", self.name, [type(self).name])
-        check_fields(self, positive_range, self.ranges)
+        check_fields(self, number_range, self.ranges)
         for name in self.ranges:
             for end in getattr(self, name):
                 within(f"An end of {name}", end, *ENDS, "m")

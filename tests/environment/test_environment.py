@@ -30,6 +30,8 @@ from crane_env import (
     Task,
 )
 from crane_env.environment.single import OILCraneEnv
+from crane_env.imperfections.registry import describe
+from crane_env.imperfections.sensing import SensorNoise
 from crane_env.operators.base import ScheduledOperator
 from crane_env.operators.manoeuvre import RandomManoeuvre
 
@@ -315,6 +317,7 @@ ARGUMENTS: dict[str, Any] = {
     "parameters": CraneParameters(payload_mass=150.0),
     "cost": StageCost(sway_weight=2.0),
     "task": Task(goals=(Goal(position=3.0),), obstacles=(Obstacle(left=4.0, right=5.0, top=6.0),)),
+    "imperfections": (SensorNoise(severity=0.5),),
     "render_mode": "rgb_array",
     "render_width": 640,
     "render_height": 500,
@@ -329,6 +332,7 @@ def arguments_of(env: OILCraneEnv) -> dict[str, Any]:
         "parameters": env.parameters,
         "cost": env.cost,
         "task": env._default_task,
+        "imperfections": env._default_imperfections,
         "render_mode": env.render_mode,
         "render_width": env._pictures.size[0],
         "render_height": env._pictures.size[1],
@@ -353,6 +357,7 @@ def test_mappings_of_json_are_arguments_too() -> None:
         cost={"sway_weight": 2.0},
         task=json.loads(json.dumps(dataclasses.asdict(ARGUMENTS["task"]))),
         operator=json.loads(json.dumps(dataclasses.asdict(ARGUMENTS["operator"]))),
+        imperfections=json.loads(json.dumps(describe(ARGUMENTS["imperfections"]))),
         render_mode="rgb_array",
         render_width=640,
         render_height=500,
@@ -367,6 +372,7 @@ def test_mappings_of_json_are_arguments_too() -> None:
         ({"parameters": {"payload_mass": -5.0}}, "payload_mass must be a positive"),
         ({"cost": {"sway_weight": -5.0}}, "sway_weight must be zero or a positive"),
         ({"render_mode": "ascii"}, "Unknown render_mode 'ascii'; valid: human, rgb_array"),
+        ({"imperfections": "rust"}, "Unknown imperfection 'rust'; valid: field, noise"),
         ({"task": "stacking"}, "Unknown task 'stacking'; valid: position, over-wall, bay, seq"),
     ],
 )

@@ -1,0 +1,1 @@
+"""Imperfections: what makes a crane in the field differ from the crane on paper."""

@@ -1,0 +1,173 @@
+"""Path of the signals of many cranes, from pendant to drives and from sensors to controller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crane_env.imperfections.base import (
+    EVERYONE,
+    ButtonsPart,
+    CommandPart,
+    Episode,
+    ForcePart,
+    HoistPart,
+    Imperfection,
+    MeasurementPart,
+    Moment,
+    Part,
+    PayloadPart,
+    Which,
+)
+from crane_env.imperfections.registry import PARTS
+from crane_env.observation import CraneState, largest_state
+from crane_env.parameters import CraneParameters
+
+Owners = NDArray[np.bool_] | None
+"""The cranes that have a part, shape (N,); None: all."""
+
+CABLE_LENGTH = CraneState._fields.index("cable_length")
+
+
+class SignalPath:
+    """The imperfections of N cranes; a crane that is without one is as if there were none.
+
+    Args:
+        count: number of cranes, N; they are without imperfections until `begin` gives them some.
+
+    Attributes:
+        imperfections: of each crane in its present episode, in the order of `PARTS`.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.imperfections: list[tuple[Imperfection, ...]] = [()] * count
+        self._parts: dict[str, Part] = {}
+        self._owners: dict[str, NDArray[np.bool_]] = {}
+        self._highest = np.full((count, len(CraneState._fields)), np.inf)
+        self._lowest = -self._highest
+        self._buttons: list[tuple[ButtonsPart, Owners]] = []
+        self._commands: list[tuple[CommandPart, Owners]] = []
+        self._hoists: list[tuple[HoistPart, Owners]] = []
+        self._forces: list[tuple[ForcePart, Owners]] = []
+        self._payloads: list[tuple[PayloadPart, Owners]] = []
+        self._measurements: list[tuple[MeasurementPart, Owners]] = []
+
+    def begin(
+        self,
+        cranes: Sequence[int],
+        given: Sequence[Sequence[Imperfection]],
+        episodes: Sequence[Episode],
+    ) -> None:
+        """Begins episodes.
+
+        Args:
+            cranes: whose, by number.
+            given: imperfections of each of them, as `make_imperfections` makes them.
+            episodes: that begin.
+        """
+        count = len(self.imperfections)
+        for crane, parts, episode in zip(cranes, given, episodes, strict=True):
+            self.imperfections[crane] = tuple(parts)
+            self._highest[crane] = largest_state(episode.parameters)
+            active = {part.name: part for part in parts if part.severity > 0.0}
+            for name in active.keys() - self._parts.keys():
+                self._parts[name] = active[name].build(count)
+                self._owners[name] = np.zeros(count, dtype=np.bool_)
+            for name, part in self._parts.items():
+                self._owners[name][crane] = name in active
+                if name in active:
+                    part.begin(crane, active[name], episode)
+        self._lowest = -self._highest
+        self._lowest[:, CABLE_LENGTH] = 0.0
+        # In the order in which signals meet them, with their owners; None: all cranes.
+        present = [
+            (self._parts[name], None if self._owners[name].all() else self._owners[name])
+            for name in PARTS
+            if name in self._parts and self._owners[name].any()
+        ]
+        self._buttons = [(p, o) for p, o in present if isinstance(p, ButtonsPart)]
+        self._commands = [(p, o) for p, o in present if isinstance(p, CommandPart)]
+        self._hoists = [(p, o) for p, o in present if isinstance(p, HoistPart)]
+        self._forces = [(p, o) for p, o in present if isinstance(p, ForcePart)]
+        self._payloads = [(p, o) for p, o in present if isinstance(p, PayloadPart)]
+        self._measurements = [(p, o) for p, o in present if isinstance(p, MeasurementPart)]
+
+    def references(
+        self,
+        which: Which,
+        times: NDArray[np.float64],
+        pressed: NDArray[np.bool_],
+        parameters: CraneParameters,
+    ) -> NDArray[np.float64]:
+        """References that arrive at the drives, eqs. (4) and (5) [m/s], shape (n, 2).
+
+        Args:
+            which: the cranes.
+            times: since each episode's start [s], shape (n,).
+            pressed: buttons, in the order of `Buttons`, shape (n, 4).
+            parameters: whose speeds the cranes share.
+        """
+        for part, owners in self._buttons:
+            arrived = part.arrive(which, times, pressed)
+            pressed = _of_owners(owners, which, arrived, pressed)
+        forward, backward, up, down = pressed.T.astype(np.float64)
+        travel, hoist = parameters.travel_speed, parameters.hoist_speed
+        return np.column_stack(((forward - backward) * travel, (down - up) * hoist))
+
+    def drive(
+        self, moment: Moment, asked: NDArray[np.float64], hoist_reference: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What trolley drives and hoists are given.
+
+        Args:
+            moment: what the cranes do now.
+            asked: accelerations within their limits [m/s^2], shape (N,).
+            hoist_reference: that arrived [m/s], shape (N,).
+
+        Returns:
+            Accelerations [m/s^2] and hoist references [m/s].
+        """
+        for drive, owners in self._commands:
+            asked = _of_owners(owners, EVERYONE, drive.command(moment, asked), asked)
+        for hoist, owners in self._hoists:
+            given = hoist.hoist(moment, hoist_reference)
+            hoist_reference = _of_owners(owners, EVERYONE, given, hoist_reference)
+        return asked, hoist_reference
+
+    def force(self, moment: Moment) -> NDArray[np.float64]:
+        """Horizontal forces on trolley and payload over the control period [N], shape (N, 2)."""
+        total = np.zeros((len(self.imperfections), 2))
+        for part, owners in self._forces:
+            total = _of_owners(owners, EVERYONE, total + part.force(moment), total)
+        return total
+
+    def payload_mass(self, moment: Moment, masses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Masses of the payloads over the control period, of nominal `masses` [kg], shape (N,)."""
+        for part, owners in self._payloads:
+            masses = _of_owners(owners, EVERYONE, part.mass(moment, masses), masses)
+        return masses
+
+    def measure(self, which: Which, truth: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What is measured of the truth; beyond the observation space a sensor saturates.
+
+        Args:
+            which: the cranes.
+            truth: fields of `Observation`, shape (n, 8).
+        """
+        states = truth[:, :6]
+        for part, owners in self._measurements:
+            states = _of_owners(owners, which, part.measure(which, states), states)
+        measured = truth.copy()
+        np.clip(states, self._lowest[which], self._highest[which], out=measured[:, :6])
+        return measured
+
+
+def _of_owners(owners: Owners, which: Which, changed: Any, unchanged: Any) -> Any:
+    """What a part made of values, where a crane has it, else what came in."""
+    if owners is None:
+        return changed
+    mask = owners[which]
+    return np.where(mask[:, None] if changed.ndim == 2 else mask, changed, unchanged)
