@@ -30,6 +30,7 @@ from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.tables import operator_table, summary_table
 from baselines.mpc.settings import MpcSettings
 from crane_env import CraneParameters
+from crane_env.imperfections.registry import make_imperfections
 from crane_env.operators.table1 import TABLE_1
 from crane_env.parameters import PRESETS
 from crane_env.support.extras import require
@@ -58,6 +59,8 @@ class Options:
             driven.
         settings: the optimal control problem of the predictive controllers: a JSON object, or a
             file with one, of the fields of MpcSettings that differ from the paper's.
+        imperfections: of the crane: scenarios such as field or noise, single ones such as
+            sensor-delay, each also with a severity, as field:0.5, or as a JSON object.
         output: folder of the results. Episodes that it holds of the same options and the same code
             are not played again.
         jobs: number of processes; None is one a core.
@@ -72,6 +75,7 @@ class Options:
     parameters: str = "paper"
     nominal: str | None = None
     settings: str = "{}"
+    imperfections: tuple[str, ...] = ()
     output: Path = Path("results/evaluate")
     jobs: int | None = None
     max_steps: int | None = None
@@ -97,6 +101,7 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
         nominal=None if options.nominal is None else crane_parameters(options.nominal, "nominal"),
         settings=MpcSettings.of(json_object(options.settings, "settings must be")),
         max_steps=options.max_steps,
+        imperfections=make_imperfections([*map(imperfection, options.imperfections)]),
     )
     operators = [name for given in options.operators for name in operator_names(given)]
     seeds = itertools.chain.from_iterable(map(seed_range, options.seeds))
@@ -163,6 +168,11 @@ def json_object(given: str, must_be: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ValueError(f"{must_be} a JSON object or a file with one, not {text.strip()!r}.")
     return value
+
+
+def imperfection(given: str) -> str | dict[str, Any]:
+    """A name, or what a JSON object says."""
+    return json_object(given, "imperfections must be") if given.lstrip()[:1] == "{" else given
 
 
 def operator_names(given: str) -> list[str]:

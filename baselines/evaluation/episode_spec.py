@@ -25,6 +25,8 @@ from baselines.registry import make_controller, settings_type
 from crane_env import EPISODE_STEPS, CraneParameters, Person, Trajectory, practise, run_episode
 from crane_env.controller import Controller
 from crane_env.environment.options import start_of
+from crane_env.imperfections.base import Imperfection
+from crane_env.imperfections.registry import make_imperfections
 from crane_env.operators.person.operator import PersonOperator
 from crane_env.operators.registry import make_operator, operator_program
 from crane_env.stage_cost import StageCost
@@ -43,18 +45,21 @@ class Setup:
         nominal: the crane that the controllers believe in; None: the one that is driven.
         settings: the controllers' optimal control problem; its cost is also the reward's.
         max_steps: length of the episode [control periods]; None: the environment's own.
+        imperfections: of the crane; given as for `make_imperfections`.
 
     Raises:
-        ValueError: `max_steps` is no whole number of at least 1.
+        ValueError: `max_steps` is no whole number of at least 1, or something is no imperfection.
     """
 
     crane: CraneParameters = field(default_factory=CraneParameters)
     nominal: CraneParameters | None = None
     settings: MpcSettings = field(default_factory=MpcSettings)
     max_steps: int | None = None
+    imperfections: tuple[Imperfection, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuses an episode without steps; a belief that is right is no belief of its own."""
+        object.__setattr__(self, "imperfections", make_imperfections(self.imperfections))
         if self.nominal == self.crane:
             object.__setattr__(self, "nominal", None)
         if self.max_steps is not None:
@@ -85,6 +90,7 @@ class Setup:
             nominal=mapping["nominal"] and CraneParameters.of(mapping["nominal"]),
             settings=MpcSettings.of(mapping["settings"]),
             max_steps=mapping["max_steps"],
+            imperfections=make_imperfections(mapping.get("imperfections")),
         )
 
 
@@ -221,7 +227,7 @@ def play(spec: EpisodeSpec) -> Trajectory:
             options["operator"] = _practised(
                 person, spec.controller, setup, spec.practice, tuple(spec.start.items())
             )
-        env = _environment(setup.crane, setup.settings.cost)
+        env = _environment(setup.crane, setup.settings.cost, setup.imperfections)
         observation, _ = env.reset(seed=spec.seed)  # whoever the operator is, it starts alike
         controller.act(observation)
         return run_episode(
@@ -282,8 +288,16 @@ def _controller(name: str, setup: Setup) -> Controller:
 
 
 @functools.lru_cache(maxsize=4)
-def _environment(crane: CraneParameters, cost: StageCost) -> gymnasium.Env[Any, Any]:
-    return gymnasium.make("OILCrane-v0", parameters=crane, cost=cost, max_episode_steps=-1)
+def _environment(
+    crane: CraneParameters, cost: StageCost, imperfections: tuple[Imperfection, ...]
+) -> gymnasium.Env[Any, Any]:
+    return gymnasium.make(
+        "OILCrane-v0",
+        parameters=crane,
+        cost=cost,
+        imperfections=imperfections,
+        max_episode_steps=-1,
+    )
 
 
 @functools.lru_cache(maxsize=16)
@@ -299,7 +313,14 @@ def _practised(
     if not isinstance(operator, PersonOperator):
         raise ValueError(f"Only persons can practise, not the operator {person}.")
     trying = _controller(controller, setup)
-    return practise(operator.program, trying, seed=seed, parameters=setup.crane, start=dict(start))
+    return practise(
+        operator.program,
+        trying,
+        seed=seed,
+        parameters=setup.crane,
+        start=dict(start),
+        imperfections=setup.imperfections,
+    )
 
 
 def digest(data: Any) -> str:

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from crane_env.imperfections.base import Imperfection
+from crane_env.imperfections.registry import make_imperfections
 from crane_env.operators.base import Operator
 from crane_env.operators.registry import describe_operator
 from crane_env.stage_cost import StageCost
@@ -28,6 +30,7 @@ class Origin:
         seed: of the reset; None: the environment went on from an earlier one.
         cost: what the rewards are the negative of.
         versions: of the packages that played it, by name.
+        imperfections: of the crane; given as for `make_imperfections`.
 
     Raises:
         ValueError: something else.
@@ -38,6 +41,7 @@ class Origin:
     seed: int | None = None
     cost: StageCost = field(default_factory=StageCost)
     versions: Mapping[str, str] = field(default_factory=dict)
+    imperfections: tuple[Imperfection, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuses what is no origin."""
@@ -50,10 +54,16 @@ class Origin:
         if self.seed is not None:
             object.__setattr__(self, "seed", checks.seed(self.seed))
         object.__setattr__(self, "cost", StageCost.of(self.cost))
+        object.__setattr__(self, "imperfections", make_imperfections(self.imperfections))
 
     @classmethod
     def now(
-        cls, operator: Operator | None, controller: str, seed: int | None, cost: StageCost
+        cls,
+        operator: Operator | None,
+        controller: str,
+        seed: int | None,
+        cost: StageCost,
+        imperfections: tuple[Imperfection, ...] = (),
     ) -> Origin:
         """Origin of an episode that is being played, with the versions installed."""
         try:
@@ -61,7 +71,12 @@ class Origin:
         except TypeError:  # fields that are no plain data
             described = {"name": type(operator).__name__}
         return cls(
-            operator=described, controller=controller, seed=seed, cost=cost, versions=installed()
+            operator=described,
+            controller=controller,
+            seed=seed,
+            cost=cost,
+            versions=installed(),
+            imperfections=imperfections,
         )
 
 

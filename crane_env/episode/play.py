@@ -216,9 +216,11 @@ def _play(
         cranes = inner.cranes if many else (inner.parameters,)
         operators = inner.operators if many else (inner.operator,)
         tasks = inner.tasks if many else (inner.task,)
+        imperfections = inner.imperfections if many else (inner.imperfections,)
+        name, seeds = controller_name or type(controller).__name__, seeds_of_each(seed, len(cranes))
         origins = [
-            Origin.now(operator, controller_name or type(controller).__name__, one, inner.cost)
-            for operator, one in zip(operators, seeds_of_each(seed, len(cranes)), strict=True)
+            Origin.now(operator, name, one, inner.cost, parts)
+            for operator, one, parts in zip(operators, seeds, imperfections, strict=True)
         ]
         controller.reset()
         while not over(ended):

@@ -7,6 +7,7 @@ from typing import Any
 
 from crane_env.controller import Controller, check_controller
 from crane_env.environment.single import OILCraneEnv
+from crane_env.imperfections.registry import ImperfectionSpec
 from crane_env.operators.person.person import Person
 from crane_env.operators.person.practice import Practice
 from crane_env.parameters import CraneParameters
@@ -19,6 +20,7 @@ def practise(
     seed: int,
     parameters: CraneParameters | Mapping[str, Any] | str | None = None,
     start: Mapping[str, Any] | None = None,
+    imperfections: ImperfectionSpec = None,
 ) -> Person:
     """Lets a person give `practice_trials` presses and watch what the crane makes of them.
 
@@ -28,6 +30,7 @@ def practise(
         seed: of the presses and of what is seen.
         parameters: of the crane; as for `OILCraneEnv`.
         start: where the crane begins; as the options of `OILCraneEnv.reset`.
+        imperfections: of the crane; as for `OILCraneEnv`.
 
     Returns:
         The same person with the beliefs learned.
@@ -37,7 +40,7 @@ def practise(
     """
     check_controller(controller)
     operator = Practice(person)
-    environment = OILCraneEnv(operator=operator, parameters=parameters)
+    environment = OILCraneEnv(operator=operator, parameters=parameters, imperfections=imperfections)
     observation, _ = environment.reset(seed=seed, options=dict(start or {}))
     practising = environment.operator
     assert isinstance(practising, Practice), "the environment has a copy of it"

@@ -16,10 +16,11 @@ from crane_env.operators.recording import ENVIRONMENT
 def replay(
     path: str | Path, controller: Controller, *, controller_name: str | None = None
 ) -> Trajectory:
-    """Plays a recorded episode again: same crane, start, buttons, task, seed and length.
+    """Plays a recorded episode again, with all that it was made with.
 
     With the controller that drove it, the trajectory is the recorded one bit for bit, as long as no
-    wrapper stood between the two; with another it is that one's.
+    wrapper stood between the two and, with imperfections, its reset was seeded; with another it is
+    that one's.
 
     Args:
         path: what `Trajectory.to_parquet` wrote.
@@ -48,5 +49,6 @@ def arguments_of(path: str | Path, recorded: Trajectory) -> dict[str, Any]:
         "parameters": recorded.parameters,
         "cost": recorded.origin.cost,
         "task": recorded.task,
+        "imperfections": recorded.origin.imperfections,
         "max_episode_steps": len(recorded),
     }

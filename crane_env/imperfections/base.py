@@ -22,7 +22,7 @@ import dataclasses
 import zlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +94,13 @@ class Part(ABC):
 
     Before `begin` is called for a crane, and for cranes that are without it, a part is fed all the
     same, and what it gives is not used.
+
+    Args:
+        count: number of cranes, N.
     """
+
+    @abstractmethod
+    def __init__(self, count: int) -> None: ...
 
     @abstractmethod
     def begin(self, crane: int, spec: Any, episode: Episode) -> None:
@@ -158,12 +164,13 @@ class MeasurementPart(Part):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Imperfection(ABC):
+class Imperfection:
     """One way in which a crane is not as on paper.
 
     Every field but the name is a number with a unit and a range, see `quantity`.
 
     Attributes:
+        part: what remembers of it.
         name: of the imperfection, the same for all of its class.
         severity: multiplies the effect; 0 is none at all.
 
@@ -171,6 +178,7 @@ class Imperfection(ABC):
         ValueError: a number that is none, or out of range.
     """
 
+    part: ClassVar[type[Part]]
     name: str = dataclasses.field(init=False)
     severity: float = quantity(1.0, "", "as in the field", 0.0, MOST_SEVERE)
 
@@ -182,9 +190,13 @@ class Imperfection(ABC):
                 label = f"{field.name} of {self.name!r}"
                 object.__setattr__(self, field.name, within(label, given, *field.metadata["range"]))
 
-    @abstractmethod
-    def build(self, count: int) -> Part:
-        """What remembers of this imperfection for so many cranes, each with numbers of its own."""
+
+def rounded(values: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values rounded to whole steps; where the step is 0, as they are."""
+    coarse = step > 0.0
+    whole = np.where(coarse, step, 1.0)
+    result: NDArray[np.float64] = np.where(coarse, np.rint(values / whole) * whole, values)
+    return result
 
 
 class DelayLine:
@@ -240,7 +252,7 @@ class Draws:
 
     def __init__(self, count: int, width: int, distribution: str) -> None:
         self._distribution = distribution
-        self._generators: list[np.random.Generator | None] = [None] * count
+        self._generators: dict[int, np.random.Generator] = {}
         self._drawn = np.zeros((count, self.BLOCK, width))
         self._used = np.zeros(count, dtype=np.intp)
         self._cranes = np.arange(count)
@@ -255,9 +267,8 @@ class Draws:
         cranes = self._cranes[which]
         used = self._used[which]
         for crane in cranes[used == self.BLOCK].tolist():
-            generator = self._generators[crane]
-            if generator is not None:
-                draw = getattr(generator, self._distribution)
+            if crane in self._generators:
+                draw = getattr(self._generators[crane], self._distribution)
                 self._drawn[crane] = draw(self._drawn.shape[1:])
             self._used[crane] = 0
         numbers: NDArray[np.float64] = self._drawn[cranes, self._used[cranes]]

@@ -48,6 +48,7 @@ class SignalPath:
         self._owners: dict[str, NDArray[np.bool_]] = {}
         self._highest = np.full((count, len(CraneState._fields)), np.inf)
         self._lowest = -self._highest
+        self._limit = np.full(count, np.inf)
         self._buttons: list[tuple[ButtonsPart, Owners]] = []
         self._commands: list[tuple[CommandPart, Owners]] = []
         self._hoists: list[tuple[HoistPart, Owners]] = []
@@ -72,9 +73,10 @@ class SignalPath:
         for crane, parts, episode in zip(cranes, given, episodes, strict=True):
             self.imperfections[crane] = tuple(parts)
             self._highest[crane] = largest_state(episode.parameters)
+            self._limit[crane] = episode.parameters.acceleration_max
             active = {part.name: part for part in parts if part.severity > 0.0}
             for name in active.keys() - self._parts.keys():
-                self._parts[name] = active[name].build(count)
+                self._parts[name] = active[name].part(count)
                 self._owners[name] = np.zeros(count, dtype=np.bool_)
             for name, part in self._parts.items():
                 self._owners[name][crane] = name in active
@@ -128,14 +130,14 @@ class SignalPath:
             hoist_reference: that arrived [m/s], shape (N,).
 
         Returns:
-            Accelerations [m/s^2] and hoist references [m/s].
+            Accelerations within their limits [m/s^2] and hoist references [m/s].
         """
         for drive, owners in self._commands:
             asked = _of_owners(owners, EVERYONE, drive.command(moment, asked), asked)
         for hoist, owners in self._hoists:
             given = hoist.hoist(moment, hoist_reference)
             hoist_reference = _of_owners(owners, EVERYONE, given, hoist_reference)
-        return asked, hoist_reference
+        return np.clip(asked, -self._limit, self._limit), hoist_reference
 
     def force(self, moment: Moment) -> NDArray[np.float64]:
         """Horizontal forces on trolley and payload over the control period [N], shape (N, 2)."""

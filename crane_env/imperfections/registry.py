@@ -7,18 +7,60 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from crane_env.imperfections.base import Imperfection
-from crane_env.imperfections.sensing import SensorNoise
+from crane_env.imperfections.drive import (
+    AccelerationQuantisation,
+    Backlash,
+    DriveDeadTime,
+    DriveLag,
+    HoistSag,
+    WornBrake,
+)
+from crane_env.imperfections.operation import EmergencyStop, PendantLatency
+from crane_env.imperfections.sensing import (
+    CableLengthError,
+    SensorBias,
+    SensorDelay,
+    SensorDropout,
+    SensorNoise,
+    SensorQuantisation,
+)
 from crane_env.support.checks import choice, real, shown
 from crane_env.support.fields import with_fields
 
-PARTS: dict[str, Imperfection] = {part.name: part for part in (SensorNoise(),)}
+PARTS: dict[str, Imperfection] = {
+    part.name: part
+    for part in (
+        PendantLatency(),
+        DriveDeadTime(),
+        DriveLag(),
+        AccelerationQuantisation(),
+        EmergencyStop(),
+        Backlash(),
+        WornBrake(),
+        HoistSag(),
+        SensorDelay(),
+        CableLengthError(),
+        SensorBias(),
+        SensorNoise(),
+        SensorQuantisation(),
+        SensorDropout(),
+    )
+}
 """Each imperfection as in the field, in the order in which signals meet them."""
 
 SCENARIOS: dict[str, tuple[Imperfection, ...]] = {
     "field": tuple(PARTS.values()),
-    "noise": (SensorNoise(),),
+    "noise": (SensorNoise(), SensorBias(), SensorQuantisation()),
+    "delay": (SensorDelay(),),
+    "noise-and-delay": (SensorDelay(), SensorNoise()),
+    "dropout": (SensorDropout(sway_angle=0.2, sway_rate=0.2, outage=0.2),),
+    "wrong-length": (CableLengthError(gain=0.1, offset=0.0),),
+    "soft-drive": (DriveDeadTime(), DriveLag()),
+    "worn-drive": (AccelerationQuantisation(), Backlash(), WornBrake(), HoistSag()),
+    "late-buttons": (PendantLatency(latency=0.3),),
+    "stops": (EmergencyStop(mean_interval=10.0, reset_time=2.0),),
 }
-"""Named sets of imperfections."""
+"""Named sets of imperfections; "field" is all of them."""
 
 ImperfectionSpec = str | Mapping[str, Any] | Imperfection | Sequence[Any] | None
 """What `make_imperfections` makes imperfections of."""

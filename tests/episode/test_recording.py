@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from baselines import make_controller
 from baselines.evaluation.episode_spec import Setup, episode_specs
 from crane_env import CraneParameters, Trajectory, replay, run_episode
+from crane_env.imperfections.registry import make_imperfections
 from crane_env.operators.recording import button_events, read_recording
 
 MOVED = {"sway_angle": 0.1, "trolley_position": -2.0, "trolley_velocity": 0.3, "cable_length": 5.5}
@@ -72,11 +73,13 @@ def test_an_episode_of_any_operator_plays_again_from_its_file_bit_for_bit(
 ) -> None:
     path = tmp_path / "episode.parquet"
     cost = {"sway_weight": 0.1, "sway_term": "angle"}
-    recorded = record(path, operator=operator, parameters="field", cost=cost, task="sequence")
+    arguments = {"parameters": "field", "cost": cost, "imperfections": "field:2"}
+    recorded = record(path, operator=operator, task="sequence", **arguments)
     again = replay(path, make_controller("adaptive", parameters="field"))
     assert_same(recorded, again)
     assert again.origin.operator["name"] == f"recording:{path}"
     assert again.task == recorded.task is not None
+    assert again.origin.imperfections == make_imperfections("field:2")
 
 
 @given(

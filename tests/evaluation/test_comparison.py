@@ -31,6 +31,7 @@ from baselines.evaluation.workers import Task, perform, play_all
 from baselines.mpc.settings import MpcSettings
 from baselines.registry import make_controller
 from crane_env import CraneParameters, Trajectory
+from crane_env.imperfections.registry import make_imperfections
 from crane_env.operators.registry import operator_program
 from crane_env.stage_cost import StageCost
 
@@ -107,6 +108,7 @@ def test_episodes_of_another_setup_are_kept_apart(tmp_path: Path) -> None:
         Setup(max_steps=120, crane=CraneParameters(payload_mass=150.0)),
         Setup(max_steps=120, nominal=CraneParameters(payload_mass=150.0)),
         Setup(max_steps=120, settings=MpcSettings(control_horizon=11)),
+        Setup(max_steps=120, imperfections=make_imperfections("sensor-noise")),
     ]
     each = [episode_specs(["manual"], ["table1:1"], [0], setup) for setup in setups]
     compare(each[0], folder, jobs=1)
@@ -116,9 +118,10 @@ def test_episodes_of_another_setup_are_kept_apart(tmp_path: Path) -> None:
     homes = [folder.record_file(spec).parent for (spec,) in each]
     assert len(set(homes)) == len(setups)
     assert folder.other_setups(each[0]) == sorted(homes[1:])
-    assert len(folder.read_metrics()) == len(folder.read_manifest()["episodes"]) == 4
-    assert [len(folder.trajectory(spec)) for (spec,) in each] == [120, 119, 120, 120, 120]
+    assert len(folder.read_metrics()) == len(folder.read_manifest()["episodes"]) == 5
+    assert [len(folder.trajectory(spec)) for (spec,) in each] == [120, 119, 120, 120, 120, 120]
     assert folder.trajectory(each[2][0]).parameters.payload_mass == 150.0
+    assert folder.trajectory(each[-1][0]).origin.imperfections == setups[-1].imperfections
 
 
 def test_episodes_of_other_code_or_packages_are_not_reused(
@@ -162,6 +165,7 @@ def test_a_setup_and_a_specification_survive_json_with_their_keys() -> None:
         nominal=CraneParameters(),
         settings=MpcSettings(acceleration_limits=(-0.2, 0.3), control_horizon=5),
         max_steps=7,
+        imperfections=make_imperfections(["noise:0.5", "backlash"]),
     )
     for spec in episode_specs(["linear"], ["stress", "table1:2", "manoeuvre"], [3], setup):
         again = EpisodeSpec.of(json.loads(json.dumps(dataclasses.asdict(spec))))
