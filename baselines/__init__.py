@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from baselines.registry import CONTROLLERS, make_controller, settings_type
+from baselines.registry import CONTROLLERS, make_controller, presets, settings_type
 
-__all__ = ["CONTROLLERS", "make_controller", "settings_type"]
+__all__ = ["CONTROLLERS", "make_controller", "presets", "settings_type"]

@@ -36,9 +36,7 @@ class Manual(Controller):
 
     def __init__(self, crane: CraneParameters) -> None:
         self._acceleration_max = crane.acceleration_max
-        self._settling_time = crane.control_period
-        if crane.drive_bandwidth > 0.0:
-            self._settling_time = max(crane.control_period, 4.0 / crane.drive_bandwidth)
+        self._settling_time = settling_time(crane)
 
     def reset(self) -> None:
         """Nothing to forget; see `Controller.reset`."""
@@ -49,6 +47,13 @@ class Manual(Controller):
         gap = measured.travel_reference - measured.trolley_velocity
         limit = self._acceleration_max
         return np.array([min(max(gap / self._settling_time, -limit), limit)])
+
+
+def settling_time(crane: CraneParameters) -> float:
+    """tau, in which a drive may be asked to close a gap of velocity [s]."""
+    if crane.drive_bandwidth == 0.0:  # a drive that is released has no lag
+        return crane.control_period
+    return max(crane.control_period, 4.0 / crane.drive_bandwidth)
 
 
 def manual(crane: CraneParameters) -> Manual:

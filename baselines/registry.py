@@ -4,20 +4,26 @@ A factory takes what its controller needs: `build(crane)`, or `build(crane, sett
 annotation of `settings` says which: a frozen dataclass whose classmethod `of` reads a mapping of
 its fields, such as `MpcSettings`. A factory of your own may leave the annotation out; it then gets
 `MpcSettings`.
+
+A preset is a name for settings of a controller, kept in presets.json with where they come from. In
+text, such as a command line, it follows the controller's name: "l1@sway".
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
+import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller, check_controller
 from crane_env.parameters import CraneParameters
-from crane_env.support.checks import shown
+from crane_env.support.checks import choice, shown
 from crane_env.support.factory import FactoryError, found_at, is_place, placed_errors
 
 CONTROLLERS: dict[str, str] = {
@@ -41,8 +47,29 @@ CONTROLLERS: dict[str, str] = {
     "ppo": "baselines.rl.onnx_policy:ppo",
     "sac": "baselines.rl.onnx_policy:sac",
     "lqr": "baselines.classical.lqr:lqr",
+    "shaper-zv": "baselines.classical.shaper:zv",
+    "shaper-zv-frozen": "baselines.classical.shaper:zv_frozen",
+    "shaper-zvd": "baselines.classical.shaper:zvd",
+    "shaper-ei": "baselines.classical.shaper:ei",
+    "shaper-um-zv": "baselines.classical.shaper:um_zv",
+    "flat": "baselines.classical.flat:flat",
 }
 """Name of each controller and where its factory is."""
+
+DEFAULT_PRESET = "paper"
+"""Of every controller: the defaults of its settings, the paper's where the paper has it."""
+
+
+class Preset(NamedTuple):
+    """Settings under a name.
+
+    Attributes:
+        settings: the fields that differ from the defaults.
+        provenance: where they come from, in a sentence.
+    """
+
+    settings: Mapping[str, Any]
+    provenance: str
 
 
 def make_controller(
@@ -50,22 +77,34 @@ def make_controller(
     *,
     parameters: CraneParameters | Mapping[str, Any] | str | None = None,
     settings: object = None,
+    preset: str | None = None,
 ) -> Controller:
     """Builds a controller from nominal parameters.
 
     Args:
-        name: one of `CONTROLLERS`, or a factory of your own as "package.module:factory".
+        name: one of `CONTROLLERS`, alone or as "name@preset", or a factory of your own as
+            "package.module:factory".
         parameters: the crane that the controller believes in; None: the paper's.
         settings: of the type that the controller takes, see `settings_type`, or a mapping of
-            fields that differ from its defaults; None: the defaults, the paper's.
+            fields that differ from the preset's; None: the preset's.
+        preset: one of `presets`; None: the name's, or "paper".
 
     Raises:
-        ValueError: an unknown name (the message lists the valid ones), values out of range, unknown
-            settings, or settings for a controller that takes none. `FactoryError`, if a factory of
-            your own fails or its result has no `reset` and `act`.
+        ValueError: an unknown name or preset (the message lists the valid ones), values out of
+            range, unknown settings, settings for a controller that takes none, or whole settings
+            beside a preset other than "paper", which they would replace. `FactoryError`, if a
+            factory of your own fails or its result has no `reset` and `act`.
         ImportError: a package is missing; the message names the extra that brings it.
     """
+    name, named = _split(name)
+    if named is not None:
+        if preset not in (None, named):
+            raise ValueError(
+                f"The controller {name!r} can have one preset, not {named!r} and {shown(preset)}."
+            )
+        preset = named
     build = _factory(name)
+    settings = _with_preset(name, settings, preset)
     takes = _settings_type(name, build)
     crane = CraneParameters.of(parameters)
     if takes is None:
@@ -93,8 +132,61 @@ def settings_type(name: str) -> type | None:
         ValueError: an unknown name, or a factory of another form than `build(crane, settings)`.
         ImportError: a module is missing.
     """
+    name, _ = _split(name)
     takes: type | None = _settings_type(name, _factory(name))
     return takes
+
+
+def presets(name: str) -> dict[str, Preset]:
+    """Presets of a controller by name, "paper" first.
+
+    Args:
+        name: as `make_controller` takes it.
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    name, _ = _split(name)
+    _factory(name)
+    default = Preset({}, "the defaults of the controller's settings")
+    return {DEFAULT_PRESET: default, **_shipped_presets().get(name, {})}
+
+
+@functools.cache
+def _shipped_presets() -> dict[str, dict[str, Preset]]:
+    read = json.loads(Path(__file__).with_name("presets.json").read_text(encoding="utf-8"))
+    return {
+        controller: {preset: Preset(**fields) for preset, fields in named.items()}
+        for controller, named in read.items()
+    }
+
+
+def _split(name: str) -> tuple[str, str | None]:
+    """The controller's name, and the preset's if there is one; only the registry's have presets."""
+    controller, at, preset = name.partition("@") if isinstance(name, str) else ("", "", "")
+    return (controller, preset) if at and controller in CONTROLLERS else (name, None)
+
+
+def _with_preset(name: str, settings: object, preset: str | None) -> object:
+    if preset is None or preset == DEFAULT_PRESET:
+        return settings
+    known = presets(name)
+    chosen = known[choice(f"preset of {name!r}", preset, known)].settings
+    if settings is not None and not isinstance(settings, Mapping):
+        raise ValueError(
+            f"Beside the preset {preset!r}, settings of {name!r} must be a mapping of fields that "
+            f"differ from it, not {type(settings).__name__}."
+        )
+    return _merged(chosen, settings or {})
+
+
+def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """A mapping with entries of another put in place of its own, mappings among them likewise."""
+    merged = {**below, **above}
+    for key in below.keys() & above.keys():
+        if isinstance(below[key], Mapping) and isinstance(above[key], Mapping):
+            merged[key] = _merged(below[key], above[key])
+    return merged
 
 
 def _factory(name: str) -> Callable[..., Any]:

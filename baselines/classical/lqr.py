@@ -24,7 +24,7 @@ The gains know of no hoist: they hold for the measured length as if it stayed (A
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, final
 
@@ -101,13 +101,45 @@ def regulator(crane: CraneParameters, cost: StageCost, cable_length: float) -> R
         ValueError: weights too far apart for a solution in double precision.
         ImportError: scipy is not installed; the message names the extra.
     """
-    linalg = require("scipy.linalg", extra="mpc")
+    omega = math.sqrt(crane.gravity / cable_length)
+    sway = cost.sway(1.0 / omega, 1.0 / (omega * cable_length), 0.0)
+    outputs = np.array([[1.0, 0.0, 1.0], [0.0, math.sqrt(cost.sway_weight) * sway, 0.0]])
+    A, B = model(crane, cable_length)
+    return riccati(A, B, outputs, cost, cable_length)
+
+
+def model(
+    crane: CraneParameters, cable_length: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A, shape (3, 3), and B, shape (3, 1), for z at a constant cable length [m]."""
     omega, period = math.sqrt(crane.gravity / cable_length), crane.control_period
     cosine, sine = math.cos(omega * period), math.sin(omega * period)
     A = np.array([[1.0, 0.0, 0.0], [0.0, cosine, sine], [0.0, -sine, cosine]])
     B = np.array([[period], [(cosine - 1.0) / omega], [-sine / omega]])
-    sway = cost.sway(1.0 / omega, 1.0 / (omega * cable_length), 0.0)
-    outputs = np.array([[1.0, 0.0, 1.0], [0.0, math.sqrt(cost.sway_weight) * sway, 0.0]])
+    return A, B
+
+
+def riccati(
+    A: NDArray[np.float64],
+    B: NDArray[np.float64],
+    outputs: NDArray[np.float64],
+    cost: StageCost,
+    cable_length: float,
+) -> Regulator:
+    """The regulator that makes the sum of |outputs z|^2 + lambda_u u^2 least.
+
+    Args:
+        A: shape (n, n).
+        B: shape (n, 1).
+        outputs: weighted, shape (any number, n).
+        cost: for lambda_u.
+        cable_length: at which this holds [m], for the error.
+
+    Raises:
+        ValueError: weights too far apart for a solution in double precision.
+        ImportError: scipy is not installed; the message names the extra.
+    """
+    linalg = require("scipy.linalg", extra="mpc")
     R = np.array([[cost.acceleration_weight]])
     try:
         P = linalg.solve_discrete_are(A, B, outputs.T @ outputs, R)
@@ -121,12 +153,55 @@ def regulator(crane: CraneParameters, cost: StageCost, cable_length: float) -> R
 
 
 @final
-class Lqr(Controller):
-    """State feedback with gains interpolated at the measured length; remembers nothing.
+class GainSchedule:
+    """Gains of a regulator, interpolated at the measured length.
 
     Args:
         crane: nominal parameters; the grid reaches from one limit of the hoist to the other, and
             lengths beyond have the gains of the limit.
+        gain_at: K of `Regulator.gain` at a length; from its third last entry on it is of v - w,
+            l omega theta and l theta'.
+
+    Raises:
+        ValueError, ImportError: as `gain_at`.
+    """
+
+    def __init__(
+        self, crane: CraneParameters, gain_at: Callable[[float], NDArray[np.float64]]
+    ) -> None:
+        shortest, longest = crane.cable_length_min, crane.cable_length_max
+        self._gains: list[tuple[float, ...]] = []
+        """Of theta and theta' themselves at each length of the grid."""
+        for length in np.geomspace(shortest, longest, NODES).tolist():
+            *others, position, rate = gain_at(length).tolist()
+            self._gains.append(
+                (*others, math.sqrt(crane.gravity * length) * position, length * rate)
+            )
+        self._shortest = shortest
+        self._nodes_per_log = (NODES - 1) / math.log(longest / shortest)
+
+    def acceleration(self, cable_length: float, deviations: tuple[float, ...]) -> float:
+        """What the regulator asks for [m/s^2].
+
+        Args:
+            cable_length: measured [m].
+            deviations: from where the crane is to be: of what the gains are of, then of v [m/s],
+                theta [rad] and theta' [rad/s].
+        """
+        node = math.log(max(cable_length, self._shortest) / self._shortest) * self._nodes_per_log
+        below = min(int(node), NODES - 2)
+        share = min(node - below, 1.0)
+        lower = _product(self._gains[below], deviations)
+        upper = _product(self._gains[below + 1], deviations)
+        return (share - 1.0) * lower - share * upper
+
+
+@final
+class Lqr(Controller):
+    """State feedback with gains interpolated at the measured length; remembers nothing.
+
+    Args:
+        crane: nominal parameters.
         settings: what is minimised.
 
     Raises:
@@ -135,15 +210,9 @@ class Lqr(Controller):
     """
 
     def __init__(self, crane: CraneParameters, settings: LqrSettings) -> None:
-        shortest, longest = crane.cable_length_min, crane.cable_length_max
-        gains = []
-        for length in np.geomspace(shortest, longest, NODES).tolist():
-            velocity, position, rate = regulator(crane, settings.cost, length).gain.tolist()
-            gains.append((velocity, math.sqrt(crane.gravity * length) * position, length * rate))
-        self._gains: list[tuple[float, float, float]] = gains
-        """Of v - w, theta and theta' at each length of the grid."""
-        self._shortest = shortest
-        self._nodes_per_log = (NODES - 1) / math.log(longest / shortest)
+        self._schedule = GainSchedule(
+            crane, lambda length: regulator(crane, settings.cost, length).gain
+        )
         self._limits = TrolleyLimits(crane, MpcSettings())
 
     def reset(self) -> None:
@@ -152,15 +221,15 @@ class Lqr(Controller):
     def act(self, observation: NDArray[np.float64]) -> NDArray[np.float64]:
         """The regulator's acceleration, within the limits; see `Controller.act`."""
         _, velocity, length, _, sway, sway_rate, reference, _ = finite_observation(observation)
-        node = math.log(max(length, self._shortest) / self._shortest) * self._nodes_per_log
-        below = min(int(node), NODES - 2)
-        share = min(node - below, 1.0)
-        a, b = self._gains[below], self._gains[below + 1]
-        error = velocity - reference
-        lower = a[0] * error + a[1] * sway + a[2] * sway_rate
-        upper = b[0] * error + b[1] * sway + b[2] * sway_rate
-        wanted = (share - 1.0) * lower - share * upper
+        wanted = self._schedule.acceleration(length, (velocity - reference, sway, sway_rate))
         return np.array([self._limits.saturate(wanted, velocity)])
+
+
+def _product(gains: tuple[float, ...], deviations: tuple[float, ...]) -> float:
+    total = 0.0
+    for gain, deviation in zip(gains, deviations, strict=True):
+        total += gain * deviation
+    return total
 
 
 def lqr(crane: CraneParameters, settings: LqrSettings) -> Lqr:

@@ -99,7 +99,8 @@ class EpisodeSpec:
     """One episode.
 
     Attributes:
-        controller: its name, as `make_controller` takes it.
+        controller: its name, as `make_controller` takes it; with a preset, such as "l1@sway",
+            the setup's settings are not for it.
         operator: its program with all fields, as `make_operator` takes it: a script's file need not
             be there any more.
         seed: of the environment's reset.
@@ -269,7 +270,9 @@ def check_settings(specs: Iterable[EpisodeSpec]) -> None:
     for setup, names in takers.items():
         # The cost is the reward's too.
         read = dataclasses.replace(setup.settings, cost=StageCost()) == MpcSettings()
-        if not read and not any(settings_type(name) is MpcSettings for name in names):
+        if not read and not any(
+            settings_type(name) is MpcSettings for name in names if "@" not in name
+        ):
             raise ValueError(
                 f"None of the controllers {', '.join(sorted(names))} takes settings of the optimal "
                 "control problem, but some were given."
@@ -280,7 +283,9 @@ def check_settings(specs: Iterable[EpisodeSpec]) -> None:
 def _controller(name: str, setup: Setup) -> Controller:
     takes: Any = settings_type(name)
     settings: object = None
-    if takes is MpcSettings:
+    if "@" in name:  # a preset's settings are its own
+        pass
+    elif takes is MpcSettings:
         settings = setup.settings
     elif takes is not None and isinstance(getattr(takes.of(None), "cost", None), StageCost):
         settings = {"cost": setup.settings.cost}
