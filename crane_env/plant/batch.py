@@ -66,11 +66,12 @@ class VectorPlant:
         self.threads = whole("threads", threads, 0, MAX_THREADS + 1)
         self.cranes = [cranes[0]] * len(cranes)
         model = build_model(cranes[0])
-        self._payload = model.body("payload").id
+        self._trolley, self._payload = model.body("trolley").id, model.body("payload").id
         self._batch = Batch(model, len(cranes), self.threads)
         self._position: NDArray[np.float64] = self._batch.bind("qpos")
         self._velocity: NDArray[np.float64] = self._batch.bind("qvel")
         self._control: NDArray[np.float64] = self._batch.bind("ctrl")
+        self._force: NDArray[np.float64] = self._batch.bind("xfrc_applied")[:, :, 0]
         cable = model.actuator("cable").id
         self._cable_gains: NDArray[np.float64] = self._batch.expand("actuator_biasprm")[
             :, cable, :3
@@ -116,7 +117,7 @@ class VectorPlant:
         self._cable_gains[:] = saved["gains"]
 
     def exchange(self, indices: NDArray[np.intp], cranes: Sequence[CraneParameters]) -> None:
-        """Gives cranes other parameters; they count from the next `reset` of the crane.
+        """Gives cranes other parameters, which count from their next `reset`; a mass, at once.
 
         Args:
             indices: which cranes, in ascending order.
@@ -232,6 +233,22 @@ class VectorPlant:
             self._put(indices, position[failed], velocity[failed], position[failed, DRUM])
             state, tension = self.measure()
         return Outcome(state, tension, travel.acceleration, travel.limited, collision_speed, failed)
+
+    def push(self, trolley: NDArray[np.float64], payload: NDArray[np.float64]) -> None:
+        """Pushes trolleys and payloads, see `Plant.push`; forces [N] of shape (N,)."""
+        self._force[:, self._trolley] = trolley
+        self._force[:, self._payload] = payload
+
+    def carry(self, payload_masses: NDArray[np.float64]) -> None:
+        """Changes the masses of the payloads, see `Plant.carry`; [kg], shape (N,)."""
+        present = np.array([crane.payload_mass for crane in self.cranes])
+        changed = np.flatnonzero(payload_masses != present)
+        cranes = [
+            dataclasses.replace(self.cranes[index], payload_mass=float(payload_masses[index]))
+            for index in changed
+        ]
+        if cranes:
+            self.exchange(changed, cranes)
 
     def _advance(self, moving: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
         """Takes physics steps; returns the cranes that could not, shape (N,)."""

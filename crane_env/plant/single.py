@@ -15,10 +15,14 @@ Setpoint and drum are kinematic: no force moves them. The trolley's drive is a v
 position loop around it, as the paper's cascaded loops, so that a soft drive lags without damping
 the sway. The cable's gains follow l_0 once per control period, at its middle: within a period they
 are at most 1 % off, at the shortest cable.
+
+From outside, horizontal forces act on trolley and payload, held for a control period. A payload may
+change its mass between control periods.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from importlib import resources
 from typing import Any
@@ -49,7 +53,6 @@ def build_model(parameters: CraneParameters) -> mujoco.MjModel:
     model.opt.timestep = parameters.control_period / parameters.substeps
     model.opt.gravity[2] = -parameters.gravity
     model.body("trolley").mass[0] = parameters.trolley_mass
-    model.body("payload").mass[0] = parameters.payload_mass
     rail = model.tendon("rail").id
     model.tendon_damping[rail] = parameters.trolley_friction
     model.tendon_range[rail] = (-parameters.rail_half_length, parameters.rail_half_length)
@@ -59,8 +62,14 @@ def build_model(parameters: CraneParameters) -> mujoco.MjModel:
     position_loop, velocity_loop = drive_loops(parameters)
     model.joint("drive_error").stiffness[0] = position_loop
     model.joint("drive_error").damping[0] = velocity_loop
-    mujoco.mj_setConst(model, mujoco.MjData(model))
+    hang(model, parameters.payload_mass)
     return model
+
+
+def hang(model: mujoco.MjModel, payload_mass: float) -> None:
+    """Hangs a payload of this mass [kg] on the cable of a model."""
+    model.body("payload").mass[0] = payload_mass
+    mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def drive_loops(parameters: CraneParameters) -> tuple[float, float]:
@@ -115,9 +124,15 @@ class Plant:
         self._position, self._velocity, self._control = data.qpos, data.qvel, data.ctrl
         cable = model.actuator("cable").id
         self._cable_gains = model.actuator_biasprm[cable, :3]
-        self._drives = Drives(parameters, drum_stroke(parameters))
+        self._trolley_force = data.xfrc_applied[model.body("trolley").id]
+        self._payload_force = data.xfrc_applied[model.body("payload").id]
         self._substeps = parameters.substeps
-        self._largest = largest_state(parameters)
+        self._refit()
+
+    def _refit(self) -> None:
+        """Works out what the present payload lets the hoist do, and how fast a sound crane is."""
+        self._drives = Drives(self._parameters, drum_stroke(self._parameters))
+        self._largest = largest_state(self._parameters)
 
     def __getstate__(self) -> dict[str, object]:
         """Parameters and full integration state: a copy continues bit for bit."""
@@ -223,6 +238,35 @@ class Plant:
     def strike(self, speed: float) -> None:
         """Strikes the payload across the cable, so that its speed changes by this [m/s]."""
         self._velocity[SWAY] += speed / self._position[REACH]
+
+    def push(self, trolley: float, payload: float) -> None:
+        """Pushes trolley and payload along the girder, until the next push or reset.
+
+        Args:
+            trolley: force on it, > 0 forward [N].
+            payload: force on it, > 0 forward [N].
+        """
+        self._trolley_force[0] = trolley
+        self._payload_force[0] = payload
+
+    def carry(self, payload_mass: float) -> None:
+        """Changes the mass of the payload, for now and after resets.
+
+        What is taken on comes with the payload's velocity, and what is let go keeps it: nothing
+        jolts. Position, velocity and unstretched length stay. The cable is out of balance, and
+        stretches or contracts from now on.
+
+        Args:
+            payload_mass: the new mass [kg].
+
+        Raises:
+            ValueError: the crane cannot carry it, see `CraneParameters`; it carries what it did.
+        """
+        if payload_mass == self._parameters.payload_mass:
+            return
+        self._parameters = dataclasses.replace(self._parameters, payload_mass=payload_mass)
+        hang(self.model, payload_mass)
+        self._refit()
 
     def _set_cable_gains(self, unstretched_length: float) -> None:
         parameters = self._parameters
