@@ -27,7 +27,8 @@ def markdown_report(findings: Findings) -> str:
             parts += [f"### {skill.capitalize()}", cell_table(findings.of(skill, family))]
         parts += [
             "### By cable length",
-            "Mean time [s], tasks that were not completed counted with the time limit.",
+            "Mean time [s], tasks that were not completed counted with the time limit; in brackets "
+            "the shares completed and oscillating.",
             length_table(findings, family),
             "### Ranks",
             "By the mean IAE on the ten manoeuvres of Table I, and by the mean time of each skill.",
@@ -79,18 +80,27 @@ def cell_table(outcomes: Sequence[CellOutcome]) -> str:
 
 
 def length_table(findings: Findings, family: str) -> str:
-    """Mean times at short, middle and long cables."""
-    edges = [0.0, *LENGTH_EDGES, np.inf]
-    ranges = list(itertools.pairwise(edges))
+    """Mean times at short, middle and long cables, and the shares completed and oscillating."""
     rows = []
     for skill in findings.skills:
         for one in findings.of(skill, family):
-            chosen = [one.time[one.at_lengths(*ends)] for ends in ranges]
-            times = [f"{times.mean():.1f}" if times.size else "-" for times in chosen]
-            rows.append((skill, f"`{one.cell.controller}`", *times))
+            cells = (
+                at_lengths(one, *ends) for ends in itertools.pairwise([0.0, *LENGTH_EDGES, np.inf])
+            )
+            rows.append((skill, f"`{one.cell.controller}`", *cells))
     low, high = LENGTH_EDGES
     head = ("skill", "controller", f"below {low:g} m", f"{low:g} to {high:g} m", f"from {high:g} m")
     return markdown_table(head, rows)
+
+
+def at_lengths(outcome: CellOutcome, low: float, high: float) -> str:
+    """What the cell came to on cables from `low` to before `high` [m]."""
+    chosen = outcome.at_lengths(low, high)
+    if not chosen.any():
+        return "-"
+    shares = (100.0 * flags[chosen].mean() for flags in (outcome.completed, outcome.oscillating))
+    done, oscillating = (f"{one:.0f} %" for one in shares)
+    return f"{outcome.time[chosen].mean():.1f} ({done}, {oscillating})"
 
 
 def rank_table(findings: Findings, family: str) -> str:
