@@ -11,8 +11,10 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import docstrings  # noqa: E402
 import gallery_films  # noqa: E402
+import imperfection_tables  # noqa: E402
 
 docstrings.write_room_pages(HERE / "api", "crane_env", "baselines")
+imperfection_tables.write(HERE / "api")
 
 project = "OILCrane"
 author = "The OILCrane founders"

@@ -37,7 +37,7 @@ GLARE = "glare, somebody in the way; assumed"
 GYROSCOPE = "industrial gyroscope, 0.3 degrees/s"
 TWELVE_BITS = "12 bits a turn, 360 degrees / 4096"
 FIELDBUS = "one cycle of the fieldbus"
-IMAGE = "exposure, transfer and processing of an image"
+IMAGE = "30 images/s, 10 ms of processing (arXiv 2410.10246), one cycle of the fieldbus"
 
 LARGEST = 100.0
 """Largest size of an error, in its unit."""
