@@ -301,7 +301,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         limit = self._parameters.acceleration_max
         travel_reference, hoist_reference = self._references
         command = min(max(asked, -limit), limit)
-        if self._path is not None:
+        if self._path is not None and self._path.touches_plant:
             command, hoist_reference = self._through(self._path, command, hoist_reference)
         outcome = self._plant.step(command, hoist_reference)
         self._step_index += 1
@@ -370,7 +370,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
             self._due = due_time(self._operator)
             if buttons is not self._buttons:
                 self._press(Buttons.of(buttons))
-        if self._path is not None:
+        if self._path is not None and self._path.touches_buttons:
             arrived = self._path.references(
                 EVERYONE, _one(time), self._pressed[None], self._parameters
             )

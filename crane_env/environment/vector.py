@@ -333,7 +333,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         limit = self._parameters.acceleration_max
         travel_reference, hoist_reference = self._references.copy().T
         commands = np.clip(asked, -limit, limit)
-        if self._path is not None:
+        if self._path is not None and self._path.touches_plant:
             before, tension = self._plant.measure()
             speeds = self._plant.setpoint_velocity
             now = Moment(self.times, np.column_stack(before), speeds, tension)
@@ -483,7 +483,10 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
 
     def _arrive(self, which: Which) -> None:
         """Lets what is pressed arrive; without imperfections it has."""
-        if self._path is not None:
+        if self._path is None:
+            return
+        self._references[which] = self._operator.references[which]
+        if self._path.touches_buttons:
             pressed = self._operator.buttons[which]
             self._references[which] = self._path.references(
                 which, self.times[which], pressed, self._parameters

@@ -191,12 +191,27 @@ class Imperfection:
                 object.__setattr__(self, field.name, within(label, given, *field.metadata["range"]))
 
 
-def rounded(values: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values rounded to whole steps; where the step is 0, as they are."""
-    coarse = step > 0.0
-    whole = np.where(coarse, step, 1.0)
-    result: NDArray[np.float64] = np.where(coarse, np.rint(values / whole) * whole, values)
-    return result
+class Steps:
+    """Rounds values of N cranes to whole steps; where a step is 0 they stay as they are.
+
+    Args:
+        shape: of the values, (N, ...).
+    """
+
+    def __init__(self, *shape: int) -> None:
+        self._coarse = np.zeros(shape, dtype=np.bool_)
+        self._step = np.ones(shape)
+
+    def begin(self, crane: int, step: Any) -> None:
+        """Gives one crane other steps."""
+        self._coarse[crane] = np.greater(step, 0.0)
+        self._step[crane] = np.where(self._coarse[crane], step, 1.0)
+
+    def round(self, which: Which, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values rounded, of the shape given."""
+        step = self._step[which]
+        whole: NDArray[np.float64] = np.rint(values / step) * step
+        return np.where(self._coarse[which], whole, values)
 
 
 class DelayLine:
@@ -210,6 +225,7 @@ class DelayLine:
     def __init__(self, count: int, kept: NDArray[Any]) -> None:
         self._line = np.tile(kept, (count, 1, 1))
         self._steps = np.zeros((count, len(kept)), dtype=np.intp)
+        self._cranes, self._columns = np.arange(count)[:, None], np.arange(len(kept))
 
     def begin(self, crane: int, steps: Any, before: Any) -> None:
         """Empties the line of one crane.
@@ -227,12 +243,9 @@ class DelayLine:
 
     def push(self, which: Which, values: NDArray[Any]) -> NDArray[Any]:
         """Puts in values, shape (n, W), and returns those that are due, of the same shape."""
-        line = self._line[which]
-        line[:, 1:] = line[:, :-1].copy()
-        line[:, 0] = values
-        if not isinstance(which, slice):
-            self._line[which] = line
-        due: NDArray[Any] = np.take_along_axis(line, self._steps[which][:, None], axis=1)[:, 0]
+        self._line[which, 1:] = self._line[which, :-1]
+        self._line[which, 0] = values
+        due: NDArray[Any] = self._line[self._cranes[which], self._steps[which], self._columns]
         return due
 
 
@@ -255,22 +268,28 @@ class Draws:
         self._generators: dict[int, np.random.Generator] = {}
         self._drawn = np.zeros((count, self.BLOCK, width))
         self._used = np.zeros(count, dtype=np.intp)
+        self._enough = 0  # control periods for which all cranes have numbers
         self._cranes = np.arange(count)
 
     def begin(self, crane: int, generator: np.random.Generator) -> None:
         """Gives one crane a generator."""
         self._generators[crane] = generator
         self._used[crane] = self.BLOCK
+        self._enough = 0
 
     def next(self, which: Which) -> NDArray[np.float64]:
         """Numbers of a control period, shape (n, W); 0 of a crane that has no generator yet."""
-        cranes = self._cranes[which]
-        used = self._used[which]
-        for crane in cranes[used == self.BLOCK].tolist():
+        if self._enough == 0:
+            self._refill()
+        self._enough -= 1
+        numbers: NDArray[np.float64] = self._drawn[self._cranes[which], self._used[which]]
+        self._used[which] += 1
+        return numbers
+
+    def _refill(self) -> None:
+        for crane in np.flatnonzero(self._used == self.BLOCK).tolist():
             if crane in self._generators:
                 draw = getattr(self._generators[crane], self._distribution)
                 self._drawn[crane] = draw(self._drawn.shape[1:])
             self._used[crane] = 0
-        numbers: NDArray[np.float64] = self._drawn[cranes, self._used[cranes]]
-        self._used[cranes] += 1
-        return numbers
+        self._enough = self.BLOCK - int(self._used.max())

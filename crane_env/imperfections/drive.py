@@ -18,8 +18,8 @@ from crane_env.imperfections.base import (
     HoistPart,
     Imperfection,
     Moment,
+    Steps,
     quantity,
-    rounded,
 )
 
 LONGEST_TIME = 1.0
@@ -90,13 +90,13 @@ class DriveLag(Imperfection):
 
 class _Quantisation(CommandPart):
     def __init__(self, count: int) -> None:
-        self._step = np.zeros(count)
+        self._steps = Steps(count)
 
     def begin(self, crane: int, spec: AccelerationQuantisation, episode: Episode) -> None:
-        self._step[crane] = spec.severity * spec.step
+        self._steps.begin(crane, spec.severity * spec.step)
 
     def command(self, moment: Moment, asked: NDArray[np.float64]) -> NDArray[np.float64]:
-        return rounded(asked, self._step)
+        return self._steps.round(EVERYONE, asked)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +128,7 @@ class _Backlash(CommandPart):
         moved = (self._rate + 0.5 * asked * self._period) * self._period
         place = np.where(pushing, self._place, self._place + moved)
         crossed = (place <= 0.0) | (place >= self._gap)
-        self._place = np.clip(place, 0.0, self._gap)
+        self._place = np.minimum(np.maximum(place, 0.0), self._gap)
         self._rate = np.where(crossed, 0.0, self._rate + asked * self._period)
         return np.where(pushing, asked, 0.0)
 

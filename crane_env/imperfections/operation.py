@@ -81,17 +81,19 @@ class _Stops(ButtonsPart, CommandPart):
         self, which: Which, times: NDArray[np.float64], pressed: NDArray[np.bool_]
     ) -> NDArray[np.bool_]:
         now = times + EVENT_TOLERANCE
-        for place in np.flatnonzero(self._ends[which] <= now).tolist():
-            crane = int(self._cranes[which][place])
-            while self._ends[crane] <= now[place]:
-                self._draw(crane, float(self._ends[crane]))
+        due = self._ends[which] <= now
+        if due.any():
+            for crane, time in zip(self._cranes[which][due].tolist(), now[due], strict=True):
+                while self._ends[crane] <= time:
+                    self._draw(crane, float(self._ends[crane]))
         stopped = self._begins[which] <= now
         dead = stopped[:, None] | (self._dead[which] & pressed)
         self._stopped[which], self._dead[which] = stopped, dead
         return pressed & ~dead
 
     def command(self, moment: Moment, asked: NDArray[np.float64]) -> NDArray[np.float64]:
-        braking = np.clip(-moment.setpoint_velocity / self._period, -self._limit, self._limit)
+        stopping = -moment.setpoint_velocity / self._period
+        braking = np.maximum(np.minimum(stopping, self._limit), -self._limit)
         return np.where(self._stopped, braking, asked)
 
 

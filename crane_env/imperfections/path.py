@@ -97,6 +97,16 @@ class SignalPath:
         self._payloads = [(p, o) for p, o in present if isinstance(p, PayloadPart)]
         self._measurements = [(p, o) for p, o in present if isinstance(p, MeasurementPart)]
 
+    @property
+    def touches_buttons(self) -> bool:
+        """Whether there is a part between the buttons and their references."""
+        return bool(self._buttons)
+
+    @property
+    def touches_plant(self) -> bool:
+        """Whether there is a part between the commands and the plant, or one that acts on it."""
+        return bool(self._commands or self._hoists or self._forces or self._payloads)
+
     def references(
         self,
         which: Which,
@@ -115,9 +125,10 @@ class SignalPath:
         for part, owners in self._buttons:
             arrived = part.arrive(which, times, pressed)
             pressed = _of_owners(owners, which, arrived, pressed)
-        forward, backward, up, down = pressed.T.astype(np.float64)
         travel, hoist = parameters.travel_speed, parameters.hoist_speed
-        return np.column_stack(((forward - backward) * travel, (down - up) * hoist))
+        each = np.array([[travel, 0.0], [-travel, 0.0], [0.0, -hoist], [0.0, hoist]])
+        references: NDArray[np.float64] = pressed @ each
+        return references
 
     def drive(
         self, moment: Moment, asked: NDArray[np.float64], hoist_reference: NDArray[np.float64]
@@ -137,7 +148,7 @@ class SignalPath:
         for hoist, owners in self._hoists:
             given = hoist.hoist(moment, hoist_reference)
             hoist_reference = _of_owners(owners, EVERYONE, given, hoist_reference)
-        return np.clip(asked, -self._limit, self._limit), hoist_reference
+        return np.maximum(np.minimum(asked, self._limit), -self._limit), hoist_reference
 
     def force(self, moment: Moment) -> NDArray[np.float64]:
         """Horizontal forces on trolley and payload over the control period [N], shape (N, 2)."""
@@ -163,7 +174,7 @@ class SignalPath:
         for part, owners in self._measurements:
             states = _of_owners(owners, which, part.measure(which, states), states)
         measured = truth.copy()
-        np.clip(states, self._lowest[which], self._highest[which], out=measured[:, :6])
+        measured[:, :6] = np.maximum(np.minimum(states, self._highest[which]), self._lowest[which])
         return measured
 
 

@@ -20,9 +20,9 @@ from crane_env.imperfections.base import (
     Episode,
     Imperfection,
     MeasurementPart,
+    Steps,
     Which,
     quantity,
-    rounded,
 )
 from crane_env.observation import CraneState
 
@@ -171,13 +171,13 @@ class SensorNoise(Imperfection):
 
 class _Quantisation(MeasurementPart):
     def __init__(self, count: int) -> None:
-        self._step = np.zeros((count, CHANNELS))
+        self._steps = Steps(count, CHANNELS)
 
     def begin(self, crane: int, spec: SensorQuantisation, episode: Episode) -> None:
-        self._step[crane] = sizes(spec)
+        self._steps.begin(crane, sizes(spec))
 
     def measure(self, which: Which, states: NDArray[np.float64]) -> NDArray[np.float64]:
-        return rounded(states, self._step[which])
+        return self._steps.round(which, states)
 
 
 @dataclass(frozen=True, kw_only=True)
