@@ -7,6 +7,8 @@ its fields, such as `MpcSettings`. A factory of your own may leave the annotatio
 
 A preset is a name for settings of a controller, kept in presets.json with where they come from. In
 text, such as a command line, it follows the controller's name: "l1@sway".
+
+What may stand in front of any of them, "estimated:adaptive", is in `baselines.wrappers`.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from baselines.mpc.settings import MpcSettings
+from baselines.wrappers import WRAPPERS, innermost, unwrap
 from crane_env.controller import Controller, check_controller
 from crane_env.parameters import CraneParameters
 from crane_env.support.checks import choice, shown
@@ -88,7 +91,7 @@ def make_controller(
 
     Args:
         name: one of `CONTROLLERS`, alone or as "name@preset", or a factory of your own as
-            "package.module:factory".
+            "package.module:factory"; behind any of `WRAPPERS`, as "estimated:adaptive".
         parameters: the crane that the controller believes in; None: the paper's.
         settings: of the type that the controller takes, see `settings_type`, or a mapping of
             fields that differ from the preset's; None: the preset's.
@@ -101,6 +104,12 @@ def make_controller(
             factory of your own fails or its result has no `reset` and `act`.
         ImportError: a package is missing; the message names the extra that brings it.
     """
+    crane = CraneParameters.of(parameters)
+    wrapped = unwrap(name)
+    if wrapped is not None:
+        wrapper, told, inner = wrapped
+        behind = make_controller(inner, parameters=crane, settings=settings, preset=preset)
+        return found_at(WRAPPERS[wrapper])(crane, behind, told)  # type: ignore[no-any-return]
     name, named = _split(name)
     if named is not None:
         if preset not in (None, named):
@@ -111,7 +120,6 @@ def make_controller(
     build = _factory(name)
     settings = _with_preset(name, settings, preset)
     takes = _settings_type(name, build)
-    crane = CraneParameters.of(parameters)
     if takes is None:
         if settings is not None:
             raise ValueError(f"The controller {name!r} takes no settings, but was given some.")
@@ -137,7 +145,7 @@ def settings_type(name: str) -> type | None:
         ValueError: an unknown name, or a factory of another form than `build(crane, settings)`.
         ImportError: a module is missing.
     """
-    name, _ = _split(name)
+    name, _ = _split(innermost(name))
     takes: type | None = _settings_type(name, _factory(name))
     return takes
 
@@ -151,7 +159,7 @@ def presets(name: str) -> dict[str, Preset]:
     Raises:
         ValueError: an unknown name.
     """
-    name, _ = _split(name)
+    name, _ = _split(innermost(name))
     _factory(name)
     default = Preset({}, "the defaults of the controller's settings")
     return {DEFAULT_PRESET: default, **_shipped_presets().get(name, {})}

@@ -98,8 +98,10 @@ def test_only_the_plant_its_picture_and_its_benchmark_import_mujoco() -> None:
 def controller_modules() -> list[Path]:
     """Modules that `make_controller` can reach, by following imports within baselines."""
     from baselines.registry import CONTROLLERS
+    from baselines.wrappers import WRAPPERS
 
-    pending = {entry.split(":")[0] for entry in CONTROLLERS.values()}
+    places = [*CONTROLLERS.values(), *WRAPPERS.values()]
+    pending = {entry.split(":")[0] for entry in places}
     reached: set[str] = set()
     while pending:
         module = pending.pop()

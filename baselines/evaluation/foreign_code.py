@@ -26,6 +26,7 @@ from typing import Any
 import baselines
 import crane_env
 from baselines.registry import CONTROLLERS
+from baselines.wrappers import innermost
 from crane_env.operators.registry import FAMILIES
 from crane_env.support.factory import LIBRARIES, is_place
 
@@ -54,7 +55,7 @@ def foreign(names: Iterable[str]) -> tuple[str, ...]:
     """Those of the names of controllers and operators that are places of factories."""
     return tuple(
         name
-        for name in names
+        for name in map(innermost, names)
         if name not in CONTROLLERS and is_place(name) and name.partition(":")[0] not in FAMILIES
     )
 

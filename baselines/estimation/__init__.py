@@ -1,0 +1,1 @@
+"""Estimation: what the crane does, from noisy and late measurements."""
