@@ -13,7 +13,9 @@ and differentiates nothing. Over a control period T in which v and l have their 
 omega = sqrt(g / l), c = cos(omega T), s = sin(omega T), e = theta - d / g, p = q - v,
 
     e+ = c e + s / (l omega) p
-    p+ = (c p - l omega s e) exp(-T l' / l)        (to second order)
+    p+ = c p - l omega s e
+
+and p times exp(-T l' / (2 l)), which is what hoisting does to it, before and after.
 
 Measured are theta and theta' = (q - v) / l. The gain K of these two is the stationary one of a
 constant length, from the discrete Riccati equation, for a grid of lengths, even in log(l), and
@@ -130,11 +132,12 @@ class SwayFilter:
         omega = math.sqrt(g / length)
         c, s = math.cos(omega * T), math.sin(omega * T)
         lean = sway.disturbance / g
-        e, p = sway.angle - lean, sway.velocity - velocity
-        wound = 0.5 * T * (before.rate + after.rate) / length
+        wound = 0.25 * T * (before.rate + after.rate) / length
+        slowed = 1.0 - wound + 0.5 * wound * wound  # by hoisting, in half a period
+        e, p = sway.angle - lean, slowed * (sway.velocity - velocity)
         return Sway(
             lean + c * e + s / (length * omega) * p,
-            velocity + (c * p - length * omega * s * e) * (1.0 - wound + 0.5 * wound * wound),
+            velocity + slowed * (c * p - length * omega * s * e),
             sway.disturbance,
         )
 
