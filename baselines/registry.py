@@ -61,6 +61,7 @@ CONTROLLERS: dict[str, str] = {
     "shaper-ei": "baselines.classical.shaper:ei",
     "shaper-um-zv": "baselines.classical.shaper:um_zv",
     "flat": "baselines.classical.flat:flat",
+    "recommended": "baselines.classical.recommended:recommended",
 }
 """Name of each controller and where its factory is."""
 

@@ -106,26 +106,16 @@ class Plan(NamedTuple):
 
 
 @final
-class Windows:
-    """The travel reference averaged over windows one after another, sample by sample.
-
-    The derivatives are of the last average as it runs on linearly between two samples.
+class Planner:
+    """The plan, sample by sample: a step of the travel reference is answered by a fixed course.
 
     Args:
-        durations: of the windows [control periods].
-        period: between two samples [s].
+        step_response: y_d, y_d' and y_d'' at the ends of the control periods after a unit step,
+            shape (3, n); the last column is (1, 0, 0).
     """
 
-    def __init__(self, durations: tuple[int, ...], period: float) -> None:
-        kernel = np.ones(1)
-        for duration in durations:
-            kernel = np.convolve(kernel, np.full(duration, 1.0 / duration))
-        slope = np.diff(kernel, prepend=0.0, append=0.0) / period
-        bend = np.diff(slope, prepend=0.0, append=0.0) / period
-        self._kernels = np.zeros((3, len(bend)))
-        self._kernels[0, : len(kernel)] = kernel
-        self._kernels[1, : len(slope)] = slope
-        self._kernels[2] = bend
+    def __init__(self, step_response: NDArray[np.float64]) -> None:
+        self._kernels = np.diff(step_response, axis=1, prepend=0.0)
         self.reset()
 
     def reset(self) -> None:
@@ -137,6 +127,18 @@ class Windows:
         self._past[1:] = self._past[:-1]
         self._past[0] = reference
         return Plan(*np.dot(self._kernels, self._past).tolist())
+
+
+def windows_step_response(windows: tuple[float, ...], period: float) -> NDArray[np.float64]:
+    """Step response of averages over windows [s] one after another, as `Planner` takes it."""
+    durations = [max(round(one / period), 1) for one in windows]
+    kernel = np.ones(1)
+    for duration in durations:
+        kernel = np.convolve(kernel, np.full(duration, 1.0 / duration))
+    velocity = np.pad(np.cumsum(kernel), (0, 2), constant_values=1.0)
+    acceleration = np.diff(velocity, prepend=0.0) / period
+    jerk = np.diff(acceleration, prepend=0.0) / period
+    return np.array([velocity, acceleration, jerk])
 
 
 @final
@@ -155,8 +157,7 @@ class Flat(Controller):
     def __init__(self, crane: CraneParameters, settings: FlatSettings) -> None:
         self._gravity, self._period = crane.gravity, crane.control_period
         self._length_min = crane.cable_length_min
-        durations = tuple(max(round(one / self._period), 1) for one in settings.windows)
-        self._windows = Windows(durations, self._period)
+        self._planner = Planner(windows_step_response(settings.windows, self._period))
         self._feedback = GainSchedule(
             crane, lambda length: regulator(crane, settings.feedback, length).gain
         )
@@ -165,14 +166,14 @@ class Flat(Controller):
 
     def reset(self) -> None:
         """Forgets the buttons; see `Controller.reset`."""
-        self._windows.reset()
+        self._planner.reset()
         self._planned = (0.0, 0.0, 0.0)
 
     def act(self, observation: NDArray[np.float64]) -> NDArray[np.float64]:
         """Acceleration along the plan and back to it; see `Controller.act`."""
         measured = finite_observation(observation)
         length = assumed_length(measured, self._length_min)
-        plan = self._windows.next(measured.travel_reference)
+        plan = self._planner.next(measured.travel_reference)
         rate, g = measured.cable_rate, self._gravity
         ahead = length + rate * self._period
         velocity = plan.velocity + (ahead * plan.jerk + rate * plan.acceleration) / g

@@ -1,0 +1,88 @@
+"""The recommended controller: its course, its displacement, what it does about a wind."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import crane_env
+from baselines import make_controller
+from baselines.classical.recommended import RecommendedSettings, course
+from crane_env.parameters import CraneParameters
+from tests.classical.pendulum import drive
+
+CRANE = CraneParameters()
+CONTROLLER = make_controller("recommended")
+
+
+@pytest.mark.parametrize(
+    ("crane", "given_settings"),
+    [
+        (CRANE, RecommendedSettings()),
+        (CRANE, RecommendedSettings(duration=3.0, effort_weight=0.001)),
+        (CraneParameters.field(), RecommendedSettings()),
+    ],
+)
+def test_the_course_keeps_its_limits_and_ends_where_it_should(
+    crane: CraneParameters, given_settings: RecommendedSettings
+) -> None:
+    velocity, acceleration, jerk = course(crane, given_settings)
+    assert (velocity[-1], acceleration[-1], jerk[-1]) == (1.0, 0.0, 0.0)
+    assert np.all((velocity > -1e-3) & (velocity < 1.0 + 1e-3))
+    leaning = np.abs(acceleration).max() * crane.travel_speed / crane.gravity
+    assert leaning <= given_settings.sway_limit * (1.0 + 1e-3)
+    third = np.diff(jerk) / crane.control_period
+    wanted = acceleration[1:] + crane.cable_length_max / crane.gravity * third
+    assert np.abs(wanted).max() < crane.acceleration_max
+    np.testing.assert_allclose(np.diff(velocity) / crane.control_period, acceleration[1:], atol=0.1)
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    press=st.floats(0.1, 5.0),
+    start=st.floats(2.0, 8.0),
+    rate=st.sampled_from([-0.2, 0.0, 0.5]),
+    direction=st.sampled_from([-1, 1]),
+)
+def test_on_the_ideal_crane_the_displacement_is_the_integral_of_the_reference(
+    press: float, start: float, rate: float, direction: int
+) -> None:
+    motion = drive(
+        CONTROLLER,
+        CRANE,
+        lambda t: direction * float(0.1 <= t < 0.1 + press),
+        lambda t: start + rate * min(t, 4.0),
+        duration=press + 12.0,
+    )
+    asked = float(np.sum(motion.reference)) * CRANE.control_period
+    assert motion.payload_position[-1] == pytest.approx(asked, abs=5e-3)
+
+
+def test_it_is_near_the_mpc_of_the_same_sway_and_effort_and_stops_in_one_distance() -> None:
+    env = gymnasium.make("OILCrane-v0", operator="manoeuvre")
+    played = [crane_env.run_episode(env, CONTROLLER, seed=s).metrics() for s in (10_000, 10_001)]
+    for metrics in played:
+        assert metrics.IAE < 2.55
+        assert math.degrees(metrics.max_sway) < 4.6
+        assert metrics.rms_acceleration < 0.6
+    assert played[0].release_drift == pytest.approx(played[1].release_drift, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("given_settings", "reason"),
+    [
+        ({"duration": 0.5}, "A duration of 0.5 s is too short for a course within the limits"),
+        ({"effort_weight": 0.0}, "effort_weight must be from 1e-06"),
+        ({"feedback": {"integral_weight": 0.0}}, "integral_weight must be a positive"),
+        ({"windows": 1.0}, "Unknown setting of the recommended controller 'windows'"),
+    ],
+)
+def test_what_makes_no_course_is_refused(given_settings: Any, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        make_controller("recommended", settings=given_settings)
