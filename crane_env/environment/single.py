@@ -15,7 +15,7 @@ from crane_env.environment.options import accelerations, read_options, start_of
 from crane_env.environment.pictures import Pictures
 from crane_env.environment.report import StepRecord, report_period, report_start
 from crane_env.imperfections.base import EVERYONE, Episode, Imperfection, Moment
-from crane_env.imperfections.path import SignalPath
+from crane_env.imperfections.path import SignalPath, check_imperfections
 from crane_env.imperfections.registry import ImperfectionSpec, make_imperfections
 from crane_env.observation import CraneState, Observation, observation_space
 from crane_env.operators.base import EVENT_TOLERANCE, RELEASED, Buttons, Operator, due_time
@@ -193,6 +193,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         check_task(self._default_task, self._parameters, begun)
         self._judge: TaskJudge | None = None
         self._default_imperfections = make_imperfections(imperfections)
+        check_imperfections(self._default_imperfections, self._parameters)
         self._path: SignalPath | None = None
         self._step_index = 0
         self._due = -math.inf
@@ -257,6 +258,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         imperfections = self._default_imperfections
         if "imperfections" in placed:
             imperfections = make_imperfections(placed.pop("imperfections"))
+            check_imperfections(imperfections, self._parameters)
         check_has_task(operator, given)
         parameters = self._parameters
         start = start_of(placed, operator, parameters)
@@ -267,7 +269,16 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         # not change the next.
         number = int(self.np_random.integers(2**63))
         task = draw_task(given, number, parameters, state)
-        self._plant.reset(start, () if task is None else task.obstacles)
+        path, mass = None, parameters.payload_mass
+        obstacles = () if task is None else task.obstacles
+        if imperfections:
+            path = SignalPath(1)
+            path.begin([0], [imperfections], [Episode(number, parameters, state)])
+            mass = path.payload_masses(np.zeros(1)).item()
+            obstacles += path.obstacles(0)
+        self._path = path
+        self._plant.carry(mass)
+        self._plant.reset(start, obstacles)
         state, tension = self._plant.measure()
         self._step_index, self._due = 0, -math.inf
         self._operator = operator
@@ -276,10 +287,6 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         if task is not None:
             self._judge = TaskJudge(task, parameters.control_period)
             set_upon(self._operator, task, 0)
-        self._path = None
-        if imperfections:
-            self._path = SignalPath(1)
-            self._path.begin([0], [imperfections], [Episode(number, parameters, state)])
         self._read_buttons(state)
         info = report_start(state, tension)
         return self._show(state, info, math.nan, 0.0), info
@@ -360,6 +367,10 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         state, tension = self._plant.measure()
         speed = self._plant.setpoint_velocity
         now = Moment(*map(_one, (self.time, state, speed, tension)))
+        if path.pushes:
+            self._plant.push(*path.force(now)[0].tolist())
+        if path.loads:
+            self._plant.carry(path.payload_masses(now.times).item())
         commands, references = path.drive(now, _one(command), _one(hoist_reference))
         return commands.item(), references.item()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
@@ -31,7 +32,7 @@ from crane_env.environment.report import (
     report_start,
 )
 from crane_env.imperfections.base import EVERYONE, Episode, Imperfection, Moment, Which
-from crane_env.imperfections.path import SignalPath
+from crane_env.imperfections.path import SignalPath, check_imperfections
 from crane_env.imperfections.registry import (
     VectorImperfectionSpec,
     make_all_imperfections,
@@ -337,6 +338,10 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             before, tension = self._plant.measure()
             speeds = self._plant.setpoint_velocity
             now = Moment(self.times, np.column_stack(before), speeds, tension)
+            if self._path.pushes:
+                self._plant.push(*self._path.force(now).T)
+            if self._path.loads:
+                self._plant.carry(self._path.payload_masses(self.times))
             commands, hoist_reference = self._path.drive(now, commands, hoist_reference)
         outcome = self._plant.step(commands, hoist_reference, moving)
         self._step_index += moving
@@ -457,25 +462,39 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             if given[index] is not None:
                 task = draw_task(given[index], number, crane, start.coordinates(crane).state)
             tasks.append(task)
-        self._plant.exchange(indices, cranes)
-        self._plant.reset(indices, starts, [task.obstacles if task else () for task in tasks])
-        states = self._plant.states()
+        obstacles = [task.obstacles if task else () for task in tasks]
+        laden = cranes
         if any(parts) and self._path is None:
             self._path = SignalPath(self.num_envs)
             self._references, self._measured = self._operator.references.copy(), None
+        if self._path is not None:
+            episodes = [
+                Episode(number, crane, start.coordinates(crane).state)
+                for number, crane, start in zip(numbers, cranes, starts, strict=True)
+            ]
+            self._path.begin(indices.tolist(), parts, episodes)
+            obstacles = [
+                walls + self._path.obstacles(index)
+                for walls, index in zip(obstacles, indices.tolist(), strict=True)
+            ]
+            if self._path.loads:
+                masses = self._path.payload_masses(np.zeros(self.num_envs))[indices].tolist()
+                laden = [
+                    dataclasses.replace(crane, payload_mass=mass)
+                    for crane, mass in zip(cranes, masses, strict=True)
+                ]
+            if not any(self._path.imperfections):
+                self._path, self._references = None, self._operator.references
+        self._plant.exchange(indices, laden)
+        self._plant.reset(indices, starts, obstacles)
+        states = self._plant.states()
         everything = zip(indices.tolist(), cranes, numbers, tasks, strict=True)
-        episodes = []
         for index, crane, number, task in everything:
             state = CraneState(*states[index].tolist())
             judge = None if task is None else TaskJudge(task, crane.control_period)
             self._judge.begin(index, judge)
             stream = np.random.default_rng(number)
             self._operator.reset(index, operators[index], stream, state, crane, task)
-            episodes.append(Episode(number, crane, state))
-        if self._path is not None:
-            self._path.begin(indices.tolist(), parts, episodes)
-            if not any(self._path.imperfections):
-                self._path, self._references = None, self._operator.references
         self._step_index[indices] = 0
         self._arrive(indices)
         self._begun[indices] = True
@@ -524,8 +543,10 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             self.recorder(StepRecord(self.times, truth, own, asked, rewards.copy()))
 
     def _check_severities(self, imperfections: Sequence[tuple[Imperfection, ...]]) -> None:
-        for parts in set(imperfections):
-            scaled(parts, (self._randomisation.severity or (1.0, 1.0))[1])
+        worst = (self._randomisation.severity or (1.0, 1.0))[1]
+        for parts, crane in set(zip(imperfections, self._own_parameters, strict=True)):
+            for corner in self._randomisation.check(crane):
+                check_imperfections(scaled(parts, worst), corner)
 
     def _checked_actions(
         self, actions: NDArray[Any], moving: NDArray[np.bool_]

@@ -8,7 +8,7 @@ where its kind says:
 
     operator -> ButtonsPart -> references -> controller -> CommandPart -> trolley drive
                                     `-> HoistPart -> hoist drive
-    plant <- ForcePart, PayloadPart
+    plant <- ForcePart, PayloadPart, ObstaclePart
     controller <- MeasurementPart <- plant's truth
 
 A part of several kinds is a subclass of each. Whatever a part draws comes from generators of its
@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from crane_env.observation import CraneState
 from crane_env.parameters import CraneParameters
 from crane_env.support.checks import within
+from crane_env.tasks.task import Obstacle
 
 STREAM = 3
 """Beside an episode's number, the seed of its imperfections; 1 is its crane's and 2 its task's."""
@@ -151,8 +152,16 @@ class PayloadPart(Part):
     """Changes the payload."""
 
     @abstractmethod
-    def mass(self, moment: Moment, masses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Masses of the payloads over the control period, of those without it [kg], shape (N,)."""
+    def mass(self, times: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Masses of the payloads at `times` [s], of those without it [kg], shape (N,)."""
+
+
+class ObstaclePart(Part):
+    """Stands in the payload's way."""
+
+    @abstractmethod
+    def obstacles(self, crane: int) -> tuple[Obstacle, ...]:
+        """That stop the payload of one crane, besides those of its task."""
 
 
 class MeasurementPart(Part):

@@ -18,6 +18,7 @@ from crane_env.imperfections.base import (
     Imperfection,
     MeasurementPart,
     Moment,
+    ObstaclePart,
     Part,
     PayloadPart,
     Which,
@@ -25,6 +26,8 @@ from crane_env.imperfections.base import (
 from crane_env.imperfections.registry import PARTS
 from crane_env.observation import CraneState, largest_state
 from crane_env.parameters import CraneParameters
+from crane_env.plant.start import AT_REST
+from crane_env.tasks.task import Obstacle
 
 Owners = NDArray[np.bool_] | None
 """The cranes that have a part, shape (N,); None: all."""
@@ -49,6 +52,7 @@ class SignalPath:
         self._highest = np.full((count, len(CraneState._fields)), np.inf)
         self._lowest = -self._highest
         self._limit = np.full(count, np.inf)
+        self._masses = np.ones(count)
         self._buttons: list[tuple[ButtonsPart, Owners]] = []
         self._commands: list[tuple[CommandPart, Owners]] = []
         self._hoists: list[tuple[HoistPart, Owners]] = []
@@ -74,6 +78,7 @@ class SignalPath:
             self.imperfections[crane] = tuple(parts)
             self._highest[crane] = largest_state(episode.parameters)
             self._limit[crane] = episode.parameters.acceleration_max
+            self._masses[crane] = episode.parameters.payload_mass
             active = {part.name: part for part in parts if part.severity > 0.0}
             for name in active.keys() - self._parts.keys():
                 self._parts[name] = active[name].part(count)
@@ -150,6 +155,25 @@ class SignalPath:
             hoist_reference = _of_owners(owners, EVERYONE, given, hoist_reference)
         return np.maximum(np.minimum(asked, self._limit), -self._limit), hoist_reference
 
+    @property
+    def pushes(self) -> bool:
+        """Whether there is a part that `force` asks."""
+        return bool(self._forces)
+
+    @property
+    def loads(self) -> bool:
+        """Whether there is a part that `payload_masses` asks."""
+        return bool(self._payloads)
+
+    def obstacles(self, crane: int) -> tuple[Obstacle, ...]:
+        """That stop the payload of one crane, besides those of its task."""
+        present = (
+            part
+            for name, part in self._parts.items()
+            if isinstance(part, ObstaclePart) and self._owners[name][crane]
+        )
+        return tuple(one for part in present for one in part.obstacles(crane))
+
     def force(self, moment: Moment) -> NDArray[np.float64]:
         """Horizontal forces on trolley and payload over the control period [N], shape (N, 2)."""
         total = np.zeros((len(self.imperfections), 2))
@@ -157,10 +181,11 @@ class SignalPath:
             total = _of_owners(owners, EVERYONE, total + part.force(moment), total)
         return total
 
-    def payload_mass(self, moment: Moment, masses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Masses of the payloads over the control period, of nominal `masses` [kg], shape (N,)."""
+    def payload_masses(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Masses of the payloads at `times` of each episode [s], [kg], shape (N,)."""
+        masses = self._masses
         for part, owners in self._payloads:
-            masses = _of_owners(owners, EVERYONE, part.mass(moment, masses), masses)
+            masses = _of_owners(owners, EVERYONE, part.mass(times, masses), masses)
         return masses
 
     def measure(self, which: Which, truth: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -176,6 +201,17 @@ class SignalPath:
         measured = truth.copy()
         measured[:, :6] = np.maximum(np.minimum(states, self._highest[which]), self._lowest[which])
         return measured
+
+
+def check_imperfections(parts: Sequence[Imperfection], parameters: CraneParameters) -> None:
+    """Makes sure that a crane can have some imperfections.
+
+    Raises:
+        ValueError: it cannot; the message says why.
+    """
+    if parts:
+        start = AT_REST.coordinates(parameters).state
+        SignalPath(1).begin([0], [parts], [Episode(0, parameters, start)])
 
 
 def _of_owners(owners: Owners, which: Which, changed: Any, unchanged: Any) -> Any:

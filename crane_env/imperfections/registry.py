@@ -15,7 +15,9 @@ from crane_env.imperfections.drive import (
     HoistSag,
     WornBrake,
 )
+from crane_env.imperfections.force import Bumps, SteadyForce
 from crane_env.imperfections.operation import EmergencyStop, PendantLatency
+from crane_env.imperfections.payload import Ground, PayloadMass
 from crane_env.imperfections.sensing import (
     CableLengthError,
     SensorBias,
@@ -24,6 +26,7 @@ from crane_env.imperfections.sensing import (
     SensorNoise,
     SensorQuantisation,
 )
+from crane_env.imperfections.wind import Wind
 from crane_env.support.checks import choice, real, shown
 from crane_env.support.fields import with_fields
 
@@ -38,6 +41,11 @@ PARTS: dict[str, Imperfection] = {
         Backlash(),
         WornBrake(),
         HoistSag(),
+        PayloadMass(),
+        Wind(),
+        SteadyForce(),
+        Bumps(),
+        Ground(),
         SensorDelay(),
         CableLengthError(),
         SensorBias(),
@@ -49,7 +57,7 @@ PARTS: dict[str, Imperfection] = {
 """Each imperfection as in the field, in the order in which signals meet them."""
 
 SCENARIOS: dict[str, tuple[Imperfection, ...]] = {
-    "field": tuple(PARTS.values()),
+    "field": tuple(part for name, part in PARTS.items() if name != "steady-force"),
     "noise": (SensorNoise(), SensorBias(), SensorQuantisation()),
     "delay": (SensorDelay(),),
     "noise-and-delay": (SensorDelay(), SensorNoise()),
@@ -59,8 +67,12 @@ SCENARIOS: dict[str, tuple[Imperfection, ...]] = {
     "worn-drive": (AccelerationQuantisation(), Backlash(), WornBrake(), HoistSag()),
     "late-buttons": (PendantLatency(latency=0.3),),
     "stops": (EmergencyStop(mean_interval=10.0, reset_time=2.0),),
+    "gust": (Wind(mean_speed=0.0, gust_speed=10.0),),
+    "air-drag": (Wind(mean_speed=0.0),),
+    "pick-up": (PayloadMass(gain=0.0, pick_up=0.5),),
+    "release": (PayloadMass(gain=0.0, pick_up=-0.3),),
 }
-"""Named sets of imperfections; "field" is all of them."""
+"""Named sets of imperfections; "field" is all but a steady force, for which it has wind."""
 
 ImperfectionSpec = str | Mapping[str, Any] | Imperfection | Sequence[Any] | None
 """What `make_imperfections` makes imperfections of."""
