@@ -16,6 +16,7 @@ from crane_env.episode.play import run_episode, run_episodes
 from crane_env.episode.practice import practise
 from crane_env.episode.recording import replay
 from crane_env.episode.trajectory import Trajectory
+from crane_env.imperfections.registry import make_imperfections
 from crane_env.observation import CraneState, Observation
 from crane_env.operators.base import ButtonEvent, Buttons, Operator
 from crane_env.operators.manoeuvre import RandomManoeuvre
@@ -72,6 +73,7 @@ __all__ = [
     "Table1Manoeuvre",
     "Task",
     "Trajectory",
+    "make_imperfections",
     "make_operator",
     "make_task",
     "practise",

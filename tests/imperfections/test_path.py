@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from crane_env import Observation
 from crane_env.environment.report import StepRecord
 from crane_env.imperfections.registry import PARTS, SCENARIOS, make_imperfections, scaled
+from crane_env.tasks.drawn import FAMILIES
 
+OPERATORS = ["random", "stress", "manoeuvre"]
 STEPS = 120
 ACTIONS = np.random.default_rng(0).uniform(-3.0, 3.0, (STEPS, 4, 1))
 EVERY_SET = [*PARTS, "field:3"]
@@ -205,7 +207,7 @@ def test_a_masked_reset_leaves_the_other_cranes_alone() -> None:
 
 
 def fuzz(steps: int, count: int) -> None:
-    """Random cranes, severities and actions: whatever happens, numbers stay numbers."""
+    """Random cranes, operators, tasks, severities and actions: numbers stay numbers."""
     rng = np.random.default_rng(1)
     names = [*PARTS, *SCENARIOS]
     each = []
@@ -216,9 +218,10 @@ def fuzz(steps: int, count: int) -> None:
     env: Any = gymnasium.make_vec(
         "OILCrane-v0",
         num_envs=count,
-        operator=[str(rng.choice(["random", "stress", "manoeuvre"])) for _ in range(count)],
+        operator=[str(rng.choice(OPERATORS)) if k % 50 else "person:novice" for k in range(count)],
+        task=[str(rng.choice([*FAMILIES])) if k % 5 == 0 else None for k in range(count)],
         imperfections=each,
-        randomisation={"payload_mass": (100.0, 300.0), "cable_length_initial": (2.0, 11.0)},
+        randomisation={"payload_mass": (100.0, 300.0), "cable_length_initial": (6.0, 11.0)},
         max_episode_steps=400,
     )
     limit = env.unwrapped.parameters.acceleration_max
