@@ -132,7 +132,7 @@ def evaluate(
         with progress("episodes", len(specs)) as advance:
             results = compare(specs, folder, jobs=jobs, command=command, on_result=advance)
     except KeyboardInterrupt:
-        kept = sum(folder.load_episode(spec, "trajectories") is not None for spec in specs)
+        kept = sum(1 for _ in folder.load(specs, "trajectories"))
         raise KeyboardInterrupt(
             f"{kept} of {len(specs)} episodes are kept in {folder.path}, and the same command goes "
             "on from there"
@@ -215,13 +215,12 @@ def report(results: Sequence[EpisodeResult], folder: ResultsFolder, drawn: Drawn
     reused = sum(result.reused for result in results)
     if reused:
         print(f"{reused} of {len(results)} episodes were there already and were not played again.")
-    others = folder.other_setups([result.spec for result in results])
-    if others:
+    if others := folder.others(result.spec for result in results):
         print(
-            f"{folder.path} also keeps episodes of {len(others)} other setup(s) (parameters, "
-            "settings, code); they lie apart and have no part in this."
+            f"{folder.path} also keeps {others} other episodes (of other options or code); they "
+            "have no part in this."
         )
-    files = [folder.metrics_file, *drawn.files[:1], *drawn.files[-1:], folder.manifest_file]
+    files = [folder.episodes.path, *drawn.files[:1], *drawn.files[-1:], folder.manifest_file]
     print(f"Results: {', '.join(map(str, files))}.")
     if failures := [*failure_lines(results), *drawn.failures]:
         raise FailedError(*failures)

@@ -220,7 +220,7 @@ def perform(
         partial.write_text(markdown_report(found), encoding="utf-8")
     print(f"Report: {report}.")
     drawn = draw(figures(found, folder), formats)
-    print(f"Results: {', '.join(map(str, (folder.metrics_file, *drawn.files)))}.")
+    print(f"Results: {', '.join(map(str, (folder.episodes.path, *drawn.files)))}.")
     if failures := [*failure_lines(played), *drawn.failures]:
         raise FailedError(*failures)
 

@@ -1,11 +1,13 @@
-"""Comparison: many episodes, played in parallel, kept on disk and resumed where they stopped."""
+"""Comparison: many episodes, played side by side, kept on disk and resumed where they stopped."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+import functools
+from collections import Counter
+from collections.abc import Callable, Sequence
 from contextlib import closing, suppress
 from datetime import UTC, datetime
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -13,14 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.evaluation import foreign_code
-from baselines.evaluation.episode_spec import EpisodeSpec, build_controller, check_settings
-from baselines.evaluation.provenance import git_state, machine, package_versions
+from baselines.evaluation.episode_spec import EpisodeSpec, build_controller, check_settings, digest
+from baselines.evaluation.provenance import code_identity, git_state, machine, package_versions
 from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
-from baselines.evaluation.workers import Task, play_all, processes
+from baselines.evaluation.workers import Task, Workers, play_all, processes
 from crane_env.support.factory import FactoryError
 
-MANIFEST_FORMAT = "oilcrane-manifest-1"
+MANIFEST_FORMAT = "oilcrane-manifest-2"
 """Version of the manifest's layout."""
+
+WAIT = (1.0, 60.0)
+"""A result waits at least and at most so long for others to be written with [s]."""
+
+LARGEST_BATCH = 512
+"""So many results are written at once."""
 
 
 def check_controllers(specs: Sequence[EpisodeSpec]) -> None:
@@ -70,10 +78,7 @@ def compare(
     command: Sequence[str] = (),
     on_result: Callable[[EpisodeResult], None] = lambda _: None,
 ) -> list[EpisodeResult]:
-    """Plays the episodes that the folder does not hold yet, and writes its table and manifest.
-
-    Interrupted by Ctrl-C (or any exception in `on_result`), it keeps every episode that finished,
-    writes table and manifest of those and raises on. The same call then goes on from there.
+    """Plays the episodes that the folder does not hold yet and gives the results of all.
 
     Args:
         specs: the episodes, no two alike.
@@ -87,72 +92,164 @@ def compare(
         The results in the order of `specs`; an episode that raised is a failed one among them.
 
     Raises:
-        ValueError: `jobs` makes no sense, see `processes`.
+        ValueError, OSError, Exception: as `complete`.
+    """
+    results: dict[str, EpisodeResult] = {}
+
+    def remember(result: EpisodeResult) -> None:
+        results[result.spec.key] = result
+        on_result(result)
+
+    number = make_ready(folder, jobs)
+    workers = functools.partial(play_all, jobs=number)
+    complete(specs, folder, workers, keep=keep, command=command, on_result=remember)
+    return [results[spec.key] for spec in specs]
+
+
+def complete(
+    specs: Sequence[EpisodeSpec],
+    folder: ResultsFolder,
+    workers: Workers,
+    *,
+    keep: Keep,
+    command: Sequence[str] = (),
+    on_result: Callable[[EpisodeResult], None] = lambda _: None,
+) -> None:
+    """Plays the episodes that a folder, made ready, does not hold yet, and writes its manifest.
+
+    Results go to the disk as they come, a hundredth of the time worked late at most, and none is
+    held in memory longer than that. Interrupted by Ctrl-C (or any exception in `on_result`), it
+    keeps every episode that finished, writes the manifest and raises on. The same call then goes
+    on from there.
+
+    Args:
+        specs: the episodes, no two alike.
+        folder: where they are kept.
+        workers: what plays them.
+        keep: what is kept of each episode.
+        command: command line, for the manifest.
+        on_result: called with every result as it comes, reused ones first.
+
+    Raises:
         OSError: the folder cannot be written, was deleted meanwhile, or another run writes to it;
             what finished is kept.
     """
-    jobs = make_ready(folder, jobs)
     foreign_code.forget()
     with folder.locked():
-        return _compare(specs, folder, jobs, keep, command, on_result)
+        _complete(specs, folder, workers, keep, command, on_result)
 
 
-def _compare(
+def _complete(
     specs: Sequence[EpisodeSpec],
     folder: ResultsFolder,
-    jobs: int,
+    workers: Workers,
     keep: Keep,
     command: Sequence[str],
     on_result: Callable[[EpisodeResult], None],
-) -> list[EpisodeResult]:
-    results: dict[str, EpisodeResult] = {}
+) -> None:
     start = perf_counter()
+    count = Counter(finished=0, failed=0, pending=len(specs))
+    setups = {spec.setup.key: spec.setup.data for spec in specs}
     facts: dict[str, Any] = {
         "format": MANIFEST_FORMAT,
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": list(command),
-        "jobs": jobs,
         "git": git_state(),
+        "code": code_identity(),
         "versions": package_versions(),
         "machine": machine(),
+        "controllers": list(dict.fromkeys(spec.controller for spec in specs)),
+        "operators": list({digest(spec.operator): spec.operator for spec in specs}.values()),
+        "setups": setups,
     }
 
     def write_manifest(status: str) -> None:
-        told = {"status": status, "duration": perf_counter() - start}
-        folder.write_manifest({**facts, **told, **_episodes(specs, results, folder)})
+        told = {"status": status, "duration": perf_counter() - start, "episodes": dict(count)}
+        folder.write_manifest({**facts, **told})
 
-    def conclude(status: str) -> None:
-        folder.check_kept(result.spec for result in results.values() if result.metrics is not None)
-        folder.write_metrics(results[spec.key] for spec in specs if spec.key in results)
-        write_manifest(status)
+    def tell(results: Sequence[EpisodeResult]) -> None:
+        for result in results:
+            count.update({"pending": -1, result.status: 1})
+        for result in results:
+            on_result(result)
 
-    def finish(result: EpisodeResult) -> None:
-        results[result.spec.key] = result
-        on_result(result)
-
-    # A summary of other episodes must not stand beside this manifest, should nothing more come.
-    folder.remove_summary()
+    # Drawings of other episodes must not stand beside this manifest, should nothing more come.
+    folder.remove_figures()
     write_manifest("running")
+    batches = Batches(folder)
     try:
-        for spec in specs:
-            if (kept := folder.load_episode(spec, keep)) is not None:
-                finish(dataclasses.replace(kept, reused=True))
-        tasks = [
-            Task(spec, spec.key, folder.path, keep) for spec in specs if spec.key not in results
-        ]
-        with closing(play_all(tasks, jobs)) as played:
-            for result in played:
-                finish(result)
+        there: set[str] = set()
+        for result in folder.load(specs, keep):
+            there.add(result.spec.key)
+            tell([result])
+        missing = [spec for spec in specs if spec.key not in there]
+        with folder.writing():
+            folder.episodes.clear({spec.key for spec in missing})
+        tasks = [Task(spec, spec.key, folder.path, keep) for spec in missing]
+        with closing(workers(tasks)) as played:
+            for results in played:
+                batches.add(results)
+                tell(results)
+        batches.write()
+        batches.check()
     except BaseException as error:
-        for spec in specs:  # workers may have finished more than they could tell
-            if spec.key not in results and (kept := folder.load_episode(spec, keep)) is not None:
-                results[spec.key] = kept
         with suppress(OSError):  # the error that ended it says more
-            conclude("failed" if isinstance(error, OSError) else "interrupted")
+            batches.write()
+        with suppress(OSError):
+            write_manifest("failed" if isinstance(error, OSError) else "interrupted")
         raise
-    failed = any(result.metrics is None for result in results.values())
-    conclude("failed" if failed else "complete")
-    return [results[spec.key] for spec in specs]
+    write_manifest("failed" if count["failed"] else "complete")
+
+
+class Batches:
+    """Results on their way to a folder's data set.
+
+    Args:
+        folder: where they go.
+    """
+
+    def __init__(self, folder: ResultsFolder) -> None:
+        self._folder = folder
+        self._begun = self._written = perf_counter()
+        self._waiting: dict[str, list[EpisodeResult]] = {}
+        self._files: list[Path] = []
+
+    def add(self, results: Sequence[EpisodeResult]) -> None:
+        """Takes results, if any; writes all that wait once they are many or wait for long.
+
+        Raises:
+            OSError: they cannot be written.
+        """
+        for result in results:
+            self._waiting.setdefault(result.spec.controller, []).append(result)
+        now = perf_counter()
+        due = np.clip(0.01 * (now - self._begun), *WAIT) <= now - self._written
+        if due or sum(map(len, self._waiting.values())) >= LARGEST_BATCH:
+            self.write()
+
+    def write(self) -> None:
+        """Writes what waits.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        self._written = perf_counter()
+        for controller in list(self._waiting):
+            self._files.append(self._folder.save(self._waiting[controller]))
+            del self._waiting[controller]  # only now: another attempt may succeed
+
+    def check(self) -> None:
+        """Makes sure that what was written has not been deleted since.
+
+        Raises:
+            OSError: it has.
+        """
+        if gone := sum(not file.is_file() for file in self._files):
+            raise OSError(
+                f"The output folder {str(self._folder.path)!r} lacks {gone} files of episodes that "
+                "this run kept in it: they were deleted meanwhile, and the same command plays "
+                "those episodes again."
+            )
 
 
 def index_values(
@@ -173,34 +270,4 @@ def index_values(
     return {
         controller: {operator: np.array(found) for operator, found in of_controller.items()}
         for controller, of_controller in values.items()
-    }
-
-
-def _episodes(
-    specs: Sequence[EpisodeSpec], results: Mapping[str, EpisodeResult], folder: ResultsFolder
-) -> dict[str, Any]:
-    """The manifest's part on setups and episodes."""
-    episodes = []
-    for spec in specs:
-        result = results.get(spec.key)
-        entry: dict[str, Any] = {
-            "controller": spec.controller,
-            "operator": spec.operator_name,
-            "seed": spec.seed,
-            "setup": spec.setup.key,
-            "status": "pending" if result is None else result.status,
-        }
-        if result is not None:
-            entry |= {"reused": result.reused, "wall_time": result.wall_time}
-            if result.metrics is None:
-                entry |= {"failure": result.failure, "traceback": result.traceback}
-            else:
-                entry["file"] = folder.record_file(spec).relative_to(folder.path).as_posix()
-        episodes.append(entry)
-    return {
-        "controllers": list(dict.fromkeys(spec.controller for spec in specs)),
-        "operators": list({spec.operator_name: spec.operator for spec in specs}.values()),
-        "seeds": list(dict.fromkeys(spec.seed for spec in specs)),
-        "setups": {spec.setup.key: spec.setup.data for spec in specs},
-        "episodes": episodes,
     }

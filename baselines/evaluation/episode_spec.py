@@ -159,7 +159,7 @@ class EpisodeSpec:
     @property
     def data(self) -> dict[str, Any]:
         """The specification as plain data: not to be changed."""
-        own = {name: getattr(self, name) for name in ("controller", "operator", "seed")}
+        own = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         return {**own, "setup": self.setup.data}
 
     @classmethod

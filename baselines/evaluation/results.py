@@ -1,17 +1,17 @@
-"""Results on disk: a folder of finished episodes, the table of their metrics and a manifest.
+"""Results on disk: a data set of episodes, their trajectories and a manifest.
 
-    manifest.json        what was run, with which code, and how each episode ended
-    metrics.parquet      one row a finished episode; nan where the index is not defined
-    figures/             drawings, if any
-    episodes/SETUP/      a folder for each setup and state of the code, named by its key:
-        CONTROLLER_OPERATOR_SEED_KEY.parquet     trajectory
-        CONTROLLER_OPERATOR_SEED_KEY.json        specification and metrics, with checksums
+    manifest.json                   what was run last, with which code, and how it ended
+    episodes/code=CODE/             a data set for each state of the code; one row an episode
+    trajectories/SETUP/             a folder for each setup and state of the code
+        CONTROLLER_OPERATOR_SEED_KEY.parquet
+    figures/                        drawings, if any
 
-An episode is finished when its JSON file is there; it is written last. Every file is written under
-another name and then renamed, so that what is there is whole, whenever the program is stopped. What
-became broken since is noticed by its checksum and played again. An episode that failed, because
-something raised or the simulation diverged, is in the manifest only: it has no row. Episodes of
-different setups never meet in one folder, nor in one table, nor do two runs at a time.
+An episode is finished when its row is there, which has its specification and the checksum of its
+trajectory. Every file is written under another name and then renamed, so that what is there is
+whole, whenever the program is stopped. What became broken since is noticed by its checksum and
+played again. An episode that failed, because something raised or the simulation diverged, has a row
+too: with the failure, without metrics. The next run plays it again. No two runs write to a folder
+at a time.
 """
 
 from __future__ import annotations
@@ -23,26 +23,33 @@ import math
 import os
 import re
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from baselines.evaluation.episode_spec import EpisodeSpec, digest
+from baselines.evaluation.dataset import Dataset, Row
+from baselines.evaluation.episode_spec import EpisodeSpec
+from baselines.evaluation.provenance import code_identity
+from baselines.mpc.settings import MpcSettings
+from crane_env import CraneParameters
 from crane_env.episode.metrics import Metrics
 from crane_env.episode.trajectory import Trajectory
-from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file
+from crane_env.imperfections.base import Imperfection
+from crane_env.imperfections.registry import PARTS, SCENARIOS, make_imperfections, scaled
+from crane_env.parameters import PRESETS
+from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file, make_folder
 from crane_env.support.extras import require
-
-METRICS_FORMAT = "oilcrane-metrics-2"
-"""Version of the layout of metrics.parquet."""
 
 PARTIAL_AGE = 60.0
 """A file still being written after this time belongs to a process that was killed [s]."""
 
 NAME_LENGTH = 40
 """So many characters of a controller's or operator's name go into a file name."""
+
+METRICS = tuple(field.name for field in dataclasses.fields(Metrics))
+"""Names of the indices."""
 
 Keep = Literal["trajectories", "metrics"]
 """What is kept of an episode: its trajectory and metrics (about 0.2 MB), or metrics only."""
@@ -58,7 +65,11 @@ class EpisodeResult:
         wall_time: how long it took [s].
         reused: it was played by an earlier run.
         failure: why it failed, in a sentence; empty if it did not.
-        traceback: where it failed; empty if it did not.
+        traceback: where it failed, as far as that is known; empty if it did not.
+        attempts: how often it was begun; more than once if its worker died or hung.
+        trajectory: checksum of its trajectory; None if that was not kept.
+        read: digest of all that foreign code could read when it was played; None if that is not
+            known.
     """
 
     spec: EpisodeSpec
@@ -67,6 +78,9 @@ class EpisodeResult:
     reused: bool = False
     failure: str = ""
     traceback: str = ""
+    attempts: int = 1
+    trajectory: str | None = None
+    read: str | None = ""
 
     @property
     def status(self) -> str:
@@ -90,9 +104,9 @@ class ResultsFolder:
         return self.path / "manifest.json"
 
     @property
-    def metrics_file(self) -> Path:
-        """The table of metrics."""
-        return self.path / "metrics.parquet"
+    def episodes(self) -> Dataset:
+        """The episodes of this state of the code."""
+        return Dataset(self.path / "episodes" / f"code={code_identity()[:12]}")
 
     @property
     def figures(self) -> Path:
@@ -101,11 +115,9 @@ class ResultsFolder:
 
     def trajectory_file(self, spec: EpisodeSpec) -> Path:
         """Where the trajectory of an episode is."""
-        return self._episode_file(spec, ".parquet")
-
-    def record_file(self, spec: EpisodeSpec) -> Path:
-        """Where specification and metrics of an episode are."""
-        return self._episode_file(spec, ".json")
+        words = (spec.controller, spec.operator_name, str(spec.seed))
+        readable = "_".join(re.sub(r"[^A-Za-z0-9.]+", "-", word)[-NAME_LENGTH:] for word in words)
+        return self.path / "trajectories" / spec.setup.key / f"{readable}_{spec.key}.parquet"
 
     def prepare(self) -> None:
         """Makes the folder, tries it out, and clears away what a killed process left behind.
@@ -115,8 +127,10 @@ class ResultsFolder:
             OSError: the folder cannot be written; the message says which and why.
         """
         require("pyarrow.parquet", extra="results")
-        with self._writing():
-            (self.path / "episodes").mkdir(parents=True, exist_ok=True)
+        with self.writing():
+            path = self.path.absolute()
+            for name in ("episodes", "trajectories"):
+                make_folder(path / name, below=Path(path.anchor))
             with atomic_file(self.path / "episodes" / ".probe") as probe:
                 pass
             probe.with_name(".probe").unlink()
@@ -124,76 +138,45 @@ class ResultsFolder:
             if time.time() - partial.stat().st_mtime > PARTIAL_AGE:
                 partial.unlink(missing_ok=True)
 
-    def save_episode(
-        self,
-        spec: EpisodeSpec,
-        trajectory: Trajectory,
-        wall_time: float,
-        keep: Keep,
-        read: str | None = "",
-    ) -> Metrics:
-        """Keeps a finished episode and returns its metrics.
+    def save_trajectory(self, spec: EpisodeSpec, trajectory: Trajectory) -> str:
+        """Keeps the trajectory of an episode and returns its checksum.
+
+        Raises:
+            OSError: the file cannot be written, or the folder is gone.
+        """
+        file = self.trajectory_file(spec)
+        with self.writing():
+            make_folder(file.parent, below=file.parents[1])
+            trajectory.to_parquet(file)
+            return file_digest(file)
+
+    def save(self, results: Iterable[EpisodeResult]) -> Path:
+        """Keeps episodes of one controller in the data set; returns the file that they are in.
+
+        Raises:
+            OSError: the file cannot be written, or the folder is gone.
+        """
+        with self.writing():
+            return self.episodes.add([_row(result) for result in results])
+
+    def load(self, specs: Iterable[EpisodeSpec], keep: Keep) -> Iterator[EpisodeResult]:
+        """Those of some episodes that finished, are whole, and as they would be if played now.
+
+        An episode of foreign code that may have read something else than it would now is not.
 
         Args:
-            spec: the episode.
-            trajectory: what was recorded.
-            wall_time: how long it took [s].
-            keep: what is kept of it.
-            read: digest of all that foreign code could read when it was played; None if that is
-                not known.
-
-        Raises:
-            OSError: a file cannot be written, or the folder is gone.
+            specs: the episodes.
+            keep: what must be there.
         """
-        metrics = trajectory.metrics()
-        record: dict[str, Any] = {
-            "spec": spec.data,
-            "metrics": _nan_to_none(metrics.as_dict()),
-            "wall_time": wall_time,
-            "read": read,
-        }
-        with self._writing():
-            # Not its parents: a folder that was deleted meanwhile must be noticed.
-            self.record_file(spec).parent.mkdir(exist_ok=True)
-            if keep == "trajectories":
-                trajectory.to_parquet(self.trajectory_file(spec))
-                record["trajectory"] = file_digest(self.trajectory_file(spec))
-            write_json(self.record_file(spec), {**record, "checksum": digest(record)}, indent=None)
-        return metrics
-
-    def load_episode(self, spec: EpisodeSpec, keep: Keep) -> EpisodeResult | None:
-        """A finished episode; None if there is none, not all of it, or if it is broken.
-
-        None too if it was played by foreign code that may have read something else than it would
-        now.
-        """
-        try:
-            record = json.loads(self.record_file(spec).read_text(encoding="utf-8"))
-            if record.pop("checksum") != digest(record):
-                return None
-            if keep == "trajectories":
-                kept = record["trajectory"] == file_digest(self.trajectory_file(spec))
-                if not kept:
-                    return None
-            metrics = Metrics(**_none_to_nan(record["metrics"]))
-            found = EpisodeResult(spec, metrics, float(record["wall_time"]))
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):
-            return None
-        read = record["read"]
-        return found if read is not None and read == spec.read() else None
-
-    def check_kept(self, specs: Iterable[EpisodeSpec]) -> None:
-        """Makes sure that what was kept has not been deleted since.
-
-        Raises:
-            OSError: it has.
-        """
-        gone = sum(not self.record_file(spec).is_file() for spec in specs)
-        if gone:
-            raise OSError(
-                f"The output folder {str(self.path)!r} lacks {gone} episodes that this run kept in "
-                "it: they were deleted meanwhile, and the same command plays them again."
-            )
+        asked = {spec.key: spec for spec in specs}
+        for row in self.episodes.rows():
+            spec = asked.get(row["key"])
+            if spec is not None and self._counts(spec, row, keep):
+                told = {name: row[name] for name in ("wall_time", "attempts", "trajectory", "read")}
+                values: dict[str, Any] = {
+                    name: math.nan if row[name] is None else row[name] for name in METRICS
+                }
+                yield EpisodeResult(spec, Metrics(**values), reused=True, **told)
 
     def trajectory(self, spec: EpisodeSpec) -> Trajectory:
         """Trajectory of a finished episode.
@@ -230,48 +213,12 @@ class ResultsFolder:
         finally:
             os.close(descriptor)
 
-    def write_metrics(self, results: Iterable[EpisodeResult]) -> None:
-        """Writes the table of metrics of the episodes that finished.
-
-        Columns: controller, operator, seed, setup (its key), and the fields of `Metrics`, SI units.
-        """
-        pyarrow = require("pyarrow", extra="results")
-        parquet = require("pyarrow.parquet", extra="results")
-        rows = [
-            {
-                "controller": result.spec.controller,
-                "operator": result.spec.operator_name,
-                "seed": result.spec.seed,
-                "setup": result.spec.setup.key,
-                **result.metrics.as_dict(),
-            }
-            for result in results
-            if result.metrics is not None
-        ]
-        types = {"str": pyarrow.string(), "int": pyarrow.int64(), "float": pyarrow.float64()}
-        types["bool"] = pyarrow.bool_()
-        columns = {"controller": "str", "operator": "str", "seed": "int", "setup": "str"}
-        columns |= {field.name: str(field.type) for field in dataclasses.fields(Metrics)}
-        schema = pyarrow.schema(
-            [(name, types[kind]) for name, kind in columns.items()],
-            metadata={"format": METRICS_FORMAT},
-        )
-        with atomic_file(self.metrics_file) as partial:
-            parquet.write_table(pyarrow.Table.from_pylist(rows, schema=schema), partial)
-
     def read_metrics(self) -> list[dict[str, Any]]:
-        """Rows of the table of metrics.
+        """Rows of the episodes that finished, of this state of the code; in no order."""
+        return [row for row in self.episodes.rows() if row["failure"] is None]
 
-        Raises:
-            FileNotFoundError: no comparison has ended here yet.
-        """
-        parquet = require("pyarrow.parquet", extra="results")
-        rows: list[dict[str, Any]] = parquet.read_table(self.metrics_file).to_pylist()
-        return rows
-
-    def remove_summary(self) -> None:
-        """Removes table and figures; the episodes stay."""
-        self.metrics_file.unlink(missing_ok=True)
+    def remove_figures(self) -> None:
+        """Removes the drawings; the episodes stay."""
         for figure in self.figures.glob("fig*.*"):
             figure.unlink()
 
@@ -288,14 +235,14 @@ class ResultsFolder:
         manifest: dict[str, Any] = json.loads(self.manifest_file.read_text(encoding="utf-8"))
         return manifest
 
-    def other_setups(self, specs: Sequence[EpisodeSpec]) -> list[Path]:
-        """Folders of episodes that belong to other setups, or to another state of the code."""
-        own = {spec.setup.key for spec in specs}
-        folders = sorted((self.path / "episodes").iterdir())
-        return [folder for folder in folders if folder.is_dir() and folder.name not in own]
+    def others(self, specs: Iterable[EpisodeSpec]) -> int:
+        """Number of rows that are kept beside those of these episodes, of any state of the code."""
+        own = {spec.key for spec in specs}
+        folders = (self.path / "episodes").glob("code=*")
+        return sum(row["key"] not in own for one in folders for row in Dataset(one).rows())
 
     @contextmanager
-    def _writing(self) -> Iterator[None]:
+    def writing(self) -> Iterator[None]:
         """Says in one sentence which folder could not be written, and why."""
         try:
             yield
@@ -305,10 +252,14 @@ class ResultsFolder:
                 f"The output folder {str(self.path)!r} cannot be written: {why}."
             ) from error
 
-    def _episode_file(self, spec: EpisodeSpec, ending: str) -> Path:
-        words = (spec.controller, spec.operator_name, str(spec.seed))
-        readable = "_".join(re.sub(r"[^A-Za-z0-9.]+", "-", word)[-NAME_LENGTH:] for word in words)
-        return self.path / "episodes" / spec.setup.key / f"{readable}_{spec.key}{ending}"
+    def _counts(self, spec: EpisodeSpec, row: Row, keep: Keep) -> bool:
+        """Whether playing an episode again would come to the same as its row."""
+        if row["failure"] is not None or row["read"] is None or row["read"] != spec.read():
+            return False
+        try:
+            return keep == "metrics" or row["trajectory"] == file_digest(self.trajectory_file(spec))
+        except OSError:
+            return False
 
 
 def write_json(path: Path, data: Any, indent: int | None = 1) -> None:
@@ -336,10 +287,60 @@ def file_digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _nan_to_none(values: dict[str, float]) -> dict[str, float | None]:
-    """JSON knows no NaN."""
-    return {name: None if math.isnan(value) else value for name, value in values.items()}
+def _row(result: EpisodeResult) -> Row:
+    """An episode as the data set keeps it."""
+    spec, setup = result.spec, result.spec.setup
+    metrics = dict.fromkeys(METRICS) if result.metrics is None else result.metrics.as_dict()
+    return {
+        "controller": spec.controller,
+        "key": spec.key,
+        "setup": setup.key,
+        "operator": spec.operator_name,
+        "task": spec.task if spec.task is None else _text(spec.task),
+        "seed": spec.seed,
+        "practice": spec.practice,
+        "crane": crane_text(setup.crane),
+        "nominal": crane_text(setup.believed),
+        "imperfections": imperfections_text(setup.imperfections),
+        "settings": _text(_differences(setup.settings, MpcSettings())),
+        "max_steps": setup.max_steps,
+        **metrics,
+        "wall_time": result.wall_time,
+        "attempts": result.attempts,
+        "failure": result.failure if result.metrics is None else None,
+        "traceback": result.traceback or None,
+        "trajectory": result.trajectory,
+        "read": result.read,
+        "specification": json.dumps(spec.data),
+    }
 
 
-def _none_to_nan(values: dict[str, float | None]) -> dict[str, Any]:
-    return {name: math.nan if value is None else value for name, value in values.items()}
+def crane_text(crane: CraneParameters) -> str:
+    """A crane's preset, or in JSON what differs from the paper's."""
+    for name, preset in PRESETS.items():
+        if crane == preset:
+            return name
+    return _text(_differences(crane, CraneParameters()))
+
+
+def imperfections_text(given: tuple[Imperfection, ...]) -> str:
+    """A scenario's or a single one's name with its severity, "none", or JSON."""
+    if not given:
+        return "none"
+    for name in (*SCENARIOS, *PARTS):
+        parts = make_imperfections(name)
+        severity = given[0].severity / parts[0].severity
+        if given == scaled(parts, severity):
+            return name if severity == 1.0 else f"{name}:{severity:.6g}"
+    return _text([{"name": one.name, **_differences(one, PARTS[one.name])} for one in given])
+
+
+def _differences(given: Any, default: Any) -> dict[str, Any]:
+    """Fields of a dataclass that differ from those of another."""
+    usual = dataclasses.asdict(default)
+    return {name: v for name, v in dataclasses.asdict(given).items() if v != usual[name]}
+
+
+def _text(value: Any) -> str:
+    """A name as it is, anything else in JSON."""
+    return value if isinstance(value, str) else json.dumps(value, sort_keys=True)

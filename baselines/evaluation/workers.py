@@ -1,27 +1,31 @@
 """Workers: processes that play episodes side by side, and what happens in one stays in it.
 
 The pool is pebble's: a process that dies (a solver's crash, lack of memory) or hangs costs the
-episode that it was playing and no other. The pool of loky, its nearest peer, gives up all episodes
-at the first death. Workers are spawned, not forked: they share nothing with this process. Ctrl-C
-reaches this process alone, which then stops them.
+episode that it was playing and no other, and that only if it does so twice. The pool of loky, its
+nearest peer, gives up all episodes at the first death. Workers are spawned, not forked: they share
+nothing with this process. Ctrl-C reaches this process alone, which then stops them.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import faulthandler
 import functools
+import itertools
+import math
 import multiprocessing
 import os
 import signal
 import sys
 import traceback
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from concurrent.futures import as_completed
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 import baselines
 import crane_env
@@ -48,6 +52,15 @@ ONE_THREAD = dict.fromkeys(
 EPISODE_TIME_MAX = 3600.0
 """An episode that takes longer hangs [s]; the slowest solver here needs four minutes."""
 
+ATTEMPTS = 2
+"""So often an episode is begun whose worker dies or hangs."""
+
+AHEAD = 4
+"""Episodes that are handed out for each process, so that none waits for work."""
+
+TICK = 1.0
+"""Longest wait for a result [s]."""
+
 MOST_JOBS = 16
 """Processes a core; each uses a core fully."""
 
@@ -61,12 +74,50 @@ class Task:
         key: its key as the parent knows it; another one here means that the code has changed.
         folder: path of the results folder.
         keep: what is kept of it.
+        attempt: how often it was begun, this time included.
+        diary: file in which a worker that is killed says where it was; None: it does not.
     """
 
     spec: EpisodeSpec
     key: str
     folder: Path
     keep: Keep
+    attempt: int = 1
+    diary: Path | None = None
+
+
+@dataclass(frozen=True)
+class Lost:
+    """How an episode ended whose worker died or hung.
+
+    Attributes:
+        why: in a sentence.
+        traceback: where it was, as far as that is known.
+    """
+
+    why: str
+    traceback: str
+
+    def result(self, task: Task) -> EpisodeResult:
+        """The episode failed."""
+        return EpisodeResult(
+            task.spec,
+            None,
+            math.nan,
+            failure=self.why,
+            traceback=self.traceback,
+            attempts=task.attempt,
+        )
+
+
+Workers = Callable[[Sequence[Task]], Generator[list[EpisodeResult], None, None]]
+"""Play episodes and give their results as `in_turn` does."""
+
+Handle = TypeVar("Handle")
+"""What an episode is known by that was handed to a worker."""
+
+Ended = Mapping[Handle, EpisodeResult | Lost | OSError]
+"""How some of them ended; an OSError where a trajectory could not be kept."""
 
 
 class StoppedError(SystemExit):
@@ -99,8 +150,8 @@ def processes(jobs: int | None) -> int:
 
 def play_all(
     tasks: Sequence[Task], jobs: int, episode_time_max: float = EPISODE_TIME_MAX
-) -> Generator[EpisodeResult, None, None]:
-    """Plays and keeps episodes; gives their results in the order in which they end.
+) -> Generator[list[EpisodeResult], None, None]:
+    """Plays episodes on this machine; gives their results as `in_turn` does.
 
     Closing the generator, or an exception in it such as KeyboardInterrupt, stops the workers; the
     episodes that they were playing leave nothing behind.
@@ -108,59 +159,134 @@ def play_all(
     Args:
         tasks: the episodes.
         jobs: number of processes, at least 1.
-        episode_time_max: an episode that takes longer fails [s].
+        episode_time_max: an episode that takes longer hangs [s].
 
     Raises:
         ImportError: pebble is missing; the message names the extra.
-        OSError: an episode that was played cannot be kept.
+        OSError: a trajectory cannot be kept.
     """
     pebble = require("pebble", extra="results")
-    with environment(ONE_THREAD):
+    with environment(ONE_THREAD), TemporaryDirectory() as diary:
         pool = pebble.ProcessPool(
             max_workers=max(1, min(jobs, len(tasks))),
             initializer=prepare,
             initargs=(import_paths(),),
             context=multiprocessing.get_context("spawn"),
         )
+
+        def start(task: Task) -> Future[EpisodeResult]:
+            noted = dataclasses.replace(task, diary=Path(diary, task.key))
+            found: Future[EpisodeResult] = pool.schedule(
+                perform, args=(noted,), timeout=episode_time_max
+            )
+            return found
+
+        def outcome(future: Future[EpisodeResult], task: Task) -> EpisodeResult | Lost | OSError:
+            try:
+                return future.result()
+            except TimeoutError:
+                why = f"The episode took longer than {episode_time_max:g} s and was ended."
+            except pebble.ProcessExpired as expired:
+                why = obituary(expired.exitcode)
+            except OSError as error:
+                return error
+            return Lost(why, _text_of(Path(diary, task.key)))
+
+        def ended(waiting: Mapping[Future[EpisodeResult], Task]) -> Ended[Future[EpisodeResult]]:
+            done, _ = wait(waiting, timeout=TICK, return_when=FIRST_COMPLETED)
+            return {future: outcome(future, waiting[future]) for future in done}
+
         try:
-            waiting = {
-                pool.schedule(perform, args=(task,), timeout=episode_time_max): task.spec
-                for task in tasks
-            }
-            for future in as_completed(waiting):
-                spec = waiting[future]
-                try:
-                    yield future.result()
-                except TimeoutError:
-                    hung = f"The episode took longer than {episode_time_max:g} s and was ended."
-                    yield EpisodeResult(spec, None, episode_time_max, failure=hung)
-                except pebble.ProcessExpired as expired:
-                    yield EpisodeResult(spec, None, 0.0, failure=obituary(expired.exitcode))
+            yield from in_turn(tasks, start, ended, lambda: AHEAD * jobs)
         finally:
             pool.stop()
             pool.join()
 
 
-def perform(task: Task) -> EpisodeResult:
-    """Plays and keeps an episode; whatever playing it raises is the result.
+def in_turn(
+    tasks: Iterable[Task],
+    start: Callable[[Task], Handle],
+    ended: Callable[[Mapping[Handle, Task]], Ended[Handle]],
+    ahead: Callable[[], int],
+) -> Generator[list[EpisodeResult], None, None]:
+    """Has episodes played a few at a time, those whose worker dies or hangs twice.
+
+    Args:
+        tasks: the episodes.
+        start: hands an episode to a worker.
+        ended: waits, `TICK` at most, for some of those that were handed out.
+        ahead: how many may be handed out now, at least 1.
+
+    Yields:
+        Results as they come; none, too, where nothing ended within `TICK`.
 
     Raises:
-        OSError: it cannot be kept, and neither could another.
+        OSError: a trajectory cannot be kept; what ended with that episode is given before.
+    """
+    coming = iter(tasks)
+    waiting: dict[Handle, Task] = {}
+    while True:
+        for task in itertools.islice(coming, max(0, ahead() - len(waiting))):
+            waiting[start(task)] = task
+        if not waiting:
+            return
+        results: list[EpisodeResult] = []
+        errors: list[OSError] = []
+        for handle, outcome in ended(waiting).items():
+            task = waiting.pop(handle)
+            if isinstance(outcome, EpisodeResult):
+                results.append(dataclasses.replace(outcome, attempts=task.attempt))
+            elif isinstance(outcome, OSError):
+                errors.append(outcome)
+            elif task.attempt < ATTEMPTS:
+                again = dataclasses.replace(task, attempt=task.attempt + 1)
+                waiting[start(again)] = again
+            else:
+                results.append(outcome.result(task))
+        yield results
+        if errors:
+            raise errors[0]
+
+
+def perform(task: Task) -> EpisodeResult:
+    """Plays an episode and keeps its trajectory; whatever playing it raises is the result.
+
+    Raises:
+        OSError: the trajectory cannot be kept, and neither could another.
     """
     # Between two episodes the pool's own handler serves, which raises nothing.
     before = signal.signal(signal.SIGTERM, leave)
     try:
-        played = attempt(task)
+        with noting_death(task.diary):
+            played = attempt(task)
         if isinstance(played, EpisodeResult):
             return played
         trajectory, wall_time, read = played
-        folder = ResultsFolder(task.folder)
-        metrics = folder.save_episode(task.spec, trajectory, wall_time, task.keep, read)
-        return EpisodeResult(task.spec, metrics, wall_time)
+        kept = None
+        if task.keep == "trajectories":
+            kept = ResultsFolder(task.folder).save_trajectory(task.spec, trajectory)
+        return EpisodeResult(task.spec, trajectory.metrics(), wall_time, trajectory=kept, read=read)
     except StoppedError as stopped:
         os._exit(stopped.code)
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def noting_death(diary: Path | None) -> Iterator[None]:
+    """Has a process that is killed within the block write where it was, as far as it can."""
+    if diary is None:
+        yield
+        return
+    with diary.open("w", encoding="utf-8") as file:
+        faulthandler.enable(file)
+        faulthandler.register(signal.SIGTERM, file, all_threads=False, chain=True)
+        try:
+            yield
+        finally:
+            faulthandler.unregister(signal.SIGTERM)
+            faulthandler.disable()
+    diary.unlink(missing_ok=True)
 
 
 def attempt(task: Task) -> tuple[Trajectory, float, str | None] | EpisodeResult:
@@ -243,3 +369,10 @@ def obituary(exit_code: Any) -> str:
     code = int(exit_code or 0)
     ended = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
     return f"The worker process ended {ended}."
+
+
+def _text_of(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""

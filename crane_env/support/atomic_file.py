@@ -52,6 +52,22 @@ def atomic_file(target: str | os.PathLike[str]) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
+def make_folder(folder: Path, below: Path) -> None:
+    """Makes a folder and those on the way to it, on the disk too, if they are not there.
+
+    Args:
+        folder: to be made.
+        below: a folder above it that is there; should it be gone, it is not made anew.
+
+    Raises:
+        OSError: a folder cannot be made, or `below` is not there.
+    """
+    for missing in reversed([folder, *folder.parents]):
+        if missing.is_relative_to(below) and missing != below and not missing.exists():
+            missing.mkdir(exist_ok=True)
+            _sync_folder(missing.parent)
+
+
 def _keep_mode(path: Path, descriptor: int) -> None:
     try:
         mode = path.lstat().st_mode

@@ -10,10 +10,12 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from baselines.commands.evaluate import json_object, main, seed_range
+from baselines.evaluation import dataset
 from baselines.evaluation.results import ResultsFolder
 from crane_env import Trajectory
 
@@ -50,15 +52,17 @@ def wait_for_records(process: subprocess.Popen[str], folder: Path, count: int) -
     assert process.poll() is None, process.communicate()
 
 
-def records(folder: Path) -> list[Path]:
-    return list(folder.glob("episodes/*/*.json"))
+def records(folder: Path) -> list[dict[str, Any]]:
+    return ResultsFolder(folder).read_metrics()
 
 
 def assert_whole(folder: Path) -> None:
     """Every file that is there under its name can be read."""
     for path in folder.rglob("*.json"):
         json.loads(path.read_text(encoding="utf-8"))
-    for path in folder.glob("episodes/*/*.parquet"):
+    for path in ResultsFolder(folder).episodes.files():
+        assert list(dataset.read(path))
+    for path in folder.glob("trajectories/*/*.parquet"):
         assert len(Trajectory.from_parquet(path)) == 150
 
 
@@ -74,7 +78,7 @@ def test_the_main_job_prints_tables_and_leaves_metrics_trajectories_figures_and_
     assert "20/20" in shown.err
     folder = ResultsFolder(output)
     assert len(folder.read_metrics()) == len(records(output)) == 20
-    assert len(list(output.glob("episodes/*/*.parquet"))) == 20
+    assert len(list(output.glob("trajectories/*/*.parquet"))) == 20
     figures = sorted(path.name for path in (output / "figures").iterdir())
     assert figures == [f"fig{number}.png" for number in range(3, 8)]
     assert folder.read_manifest()["status"] == "complete"
@@ -122,8 +126,7 @@ def test_an_interruption_keeps_the_finished_episodes_and_the_same_command_goes_o
     folder = ResultsFolder(tmp_path)
     manifest = folder.read_manifest()
     assert manifest["status"] == "interrupted"
-    finished = [entry for entry in manifest["episodes"] if entry["status"] == "finished"]
-    assert len(folder.read_metrics()) == len(finished) == kept
+    assert manifest["episodes"] == {"finished": kept, "failed": 0, "pending": 10 - kept}
     again = start(*arguments)
     out, err = again.communicate(timeout=60)
     assert again.returncode == 0, err
@@ -152,7 +155,6 @@ def test_sigkill_leaves_no_half_written_file_and_no_worker(tmp_path: Path) -> No
     assert 2 <= len(records(tmp_path)) < 10
     assert_whole(tmp_path)
     assert ResultsFolder(tmp_path).read_manifest()["status"] == "running"
-    assert not ResultsFolder(tmp_path).metrics_file.exists()
 
 
 def test_failed_episodes_are_named_and_the_exit_code_is_1(

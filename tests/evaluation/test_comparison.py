@@ -11,7 +11,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet
 import pytest
 
 import baselines.evaluation.episode_spec
@@ -112,13 +111,16 @@ def test_episodes_of_another_setup_are_kept_apart(tmp_path: Path) -> None:
     ]
     each = [episode_specs(["manual"], ["table1:1"], [0], setup) for setup in setups]
     compare(each[0], folder, jobs=1)
-    assert folder.other_setups(each[0]) == []
+    assert folder.others(each[0]) == 0
     results = compare([spec for specs in each[1:] for spec in specs], folder, jobs=1)
     assert not any(result.reused for result in results)
-    homes = [folder.record_file(spec).parent for (spec,) in each]
-    assert len(set(homes)) == len(setups)
-    assert folder.other_setups(each[0]) == sorted(homes[1:])
-    assert len(folder.read_metrics()) == len(folder.read_manifest()["episodes"]) == 5
+    assert folder.others(each[0]) == 5
+    rows = {row["setup"]: row for row in folder.read_metrics()}
+    said = [rows[spec.setup.key] for (spec,) in each]
+    assert [row["crane"] for row in said[:3]] == ["paper", "paper", '{"payload_mass": 150.0}']
+    assert [row["nominal"] for row in said[2:4]] == ['{"payload_mass": 150.0}'] * 2
+    assert [row["settings"] for row in said[3:5]] == ["{}", '{"control_horizon": 11}']
+    assert folder.read_manifest()["episodes"] == {"finished": 5, "failed": 0, "pending": 0}
     assert [len(folder.trajectory(spec)) for (spec,) in each] == [120, 119, 120, 120, 120, 120]
     assert folder.trajectory(each[2][0]).parameters.payload_mass == 150.0
     assert folder.trajectory(each[-1][0]).origin.imperfections == setups[-1].imperfections
@@ -130,7 +132,7 @@ def test_episodes_of_other_code_or_packages_are_not_reused(
     folder = ResultsFolder(tmp_path)
     compare(specs_of("manual"), folder, jobs=1)
     monkeypatch.setattr(baselines.evaluation.episode_spec, "code_identity", lambda: "other")
-    assert folder.load_episode(specs_of("manual")[0], "trajectories") is None
+    assert list(folder.load(specs_of("manual"), "trajectories")) == []
 
 
 def test_code_that_changes_while_the_comparison_runs_fails_the_episode(
@@ -139,7 +141,7 @@ def test_code_that_changes_while_the_comparison_runs_fails_the_episode(
     monkeypatch.setattr(baselines.evaluation.episode_spec, "code_identity", lambda: "before")
     (result,) = compare(specs_of("manual"), ResultsFolder(tmp_path), jobs=1)
     assert result.failure == "The code changed while the comparison was running."
-    assert not list(tmp_path.glob("episodes/*/*"))
+    assert not ResultsFolder(tmp_path).read_metrics()
 
 
 def test_the_code_identity_changes_with_every_file_and_every_computing_package(
@@ -194,7 +196,7 @@ def test_every_part_of_a_specification_changes_its_key() -> None:
         dataclasses.replace(spec, controller=f"{STUBS}:chatty"),
     ]
     assert len({spec.key, *(other.key for other in others)}) == 1 + len(others)
-    assert len({str(ResultsFolder(Path()).record_file(other)) for other in others}) == len(others)
+    assert len({ResultsFolder(Path()).trajectory_file(other) for other in others}) == len(others)
 
 
 def test_a_script_is_part_of_the_specification_and_its_file_need_not_stay(tmp_path: Path) -> None:
@@ -229,11 +231,15 @@ def test_an_episode_that_raises_is_reported_and_the_others_finish(tmp_path: Path
     assert re.search(rf"LookupError: nothing to build of \({stubs}, line", results[-1].failure)
     manifest = folder.read_manifest()
     assert manifest["status"] == "failed"
-    assert manifest["episodes"][0]["failure"] == results[0].failure
+    assert manifest["episodes"] == {"finished": 3, "failed": 2, "pending": 0}
     assert len(folder.read_metrics()) == 3
+    rows = {row["key"]: row for row in folder.episodes.rows()}
+    assert rows[specs[0].key]["failure"] == results[0].failure
+    assert "in before_act" in rows[specs[0].key]["traceback"]
     assert index_values(results, "IAE")[f"{STUBS}:raising"]["table1:1"].size == 0
     again = compare(specs, folder, jobs=2)
     assert [result.reused for result in again] == [False, True, True, True, False]
+    assert len(list(folder.episodes.rows())) == 5
     with pytest.raises(ValueError, match=rf"nothing to build of \({stubs}, line"):
         check_controllers(specs[-1:])
 
@@ -255,16 +261,21 @@ def test_a_worker_that_dies_fails_its_episode_alone(tmp_path: Path) -> None:
     results = compare(specs, ResultsFolder(tmp_path), jobs=1)
     assert [result.status for result in results] == ["failed", "failed", *["finished"] * 4]
     assert "SIGSEGV" in results[0].failure
+    assert "in before_act" in results[0].traceback
+    assert [result.attempts for result in results] == [2, 2, 1, 1, 1, 1]
 
 
 def test_a_worker_that_hangs_fails_its_episode_alone(tmp_path: Path) -> None:
     specs = specs_of("manual", f"{STUBS}:hanging")
     ResultsFolder(tmp_path).prepare()
     tasks = [Task(spec, spec.key, tmp_path, "metrics") for spec in specs]
-    played = play_all(tasks, 2, episode_time_max=15.0)
-    failures = {result.spec.controller: result.failure for result in played}
-    assert failures["manual"] == ""
-    assert "took longer than 15 s" in failures[f"{STUBS}:hanging"]
+    batches = play_all(tasks, 2, episode_time_max=6.0)
+    ended = {result.spec.controller: result for batch in batches for result in batch}
+    hung = ended[f"{STUBS}:hanging"]
+    assert ended["manual"].failure == ""
+    assert "took longer than 6 s" in hung.failure
+    assert hung.attempts == 2
+    assert "in before_act" in hung.traceback
 
 
 def test_what_a_controller_prints_does_no_harm(tmp_path: Path) -> None:
@@ -293,11 +304,9 @@ def test_an_interrupted_comparison_keeps_what_finished_and_goes_on_from_there(
         compare(specs, folder, jobs=1, on_result=interrupt)
     manifest = folder.read_manifest()
     assert manifest["status"] == "interrupted"
-    states = [entry["status"] for entry in manifest["episodes"]]
-    finished = states.count("finished")  # a worker may have finished more than it could tell
-    assert states == ["finished"] * finished + ["pending"] * (6 - finished)
+    finished = len(folder.read_metrics())
     assert 2 <= finished < 6
-    assert len(folder.read_metrics()) == finished
+    assert manifest["episodes"] == {"finished": finished, "failed": 0, "pending": 6 - finished}
     assert not list(tmp_path.rglob(".*"))
     results = compare(specs, folder, jobs=1)
     assert [result.reused for result in results[:2]] == [True, True]
@@ -307,10 +316,12 @@ def test_an_interrupted_comparison_keeps_what_finished_and_goes_on_from_there(
 
 def test_a_damaged_or_incomplete_episode_is_played_again(tmp_path: Path) -> None:
     folder = ResultsFolder(tmp_path)
-    specs = specs_of("manual", operators=("table1:1", "table1:2", "table1:3", "table1:4"))
-    compare(specs, folder, jobs=1)
-    record = folder.record_file(specs[0])
-    record.write_text(record.read_text(encoding="utf-8")[:50], encoding="utf-8")
+    specs = specs_of("manual", operators=("table1:2", "table1:3", "table1:4"))
+    specs = [*specs_of("manual"), *specs]
+    compare(specs[:1], folder, jobs=1)
+    (record,) = folder.episodes.files()
+    record.write_bytes(record.read_bytes()[:-50])
+    compare(specs[1:], folder, jobs=1)
     folder.trajectory_file(specs[1]).unlink()
     cut = folder.trajectory_file(specs[2])
     cut.write_bytes(cut.read_bytes()[:-200])
@@ -332,58 +343,62 @@ def test_metrics_alone_can_be_kept_and_do_not_pass_for_trajectories(tmp_path: Pa
     folder = ResultsFolder(tmp_path)
     specs = specs_of("manual")
     (first,) = compare(specs, folder, jobs=1, keep="metrics")
-    assert not list(tmp_path.glob("episodes/*/*.parquet"))
+    assert not list(tmp_path.glob("trajectories/*/*"))
     (second,) = compare(specs, folder, jobs=1, keep="metrics")
     assert second.reused
     np.testing.assert_equal(metrics_of(second), metrics_of(first))
     (third,) = compare(specs, folder, jobs=1, keep="trajectories")
     assert not third.reused
     assert len(folder.trajectory(specs[0])) == 120
+    assert len(folder.read_metrics()) == 1
 
 
-def test_the_table_of_metrics_is_what_the_trajectories_say(tmp_path: Path) -> None:
+def test_the_rows_are_what_the_trajectories_say(tmp_path: Path) -> None:
     folder = ResultsFolder(tmp_path)
     specs = specs_of("manual", "linear")
     compare(specs, folder, jobs=2)
-    table = pyarrow.parquet.read_table(folder.metrics_file)
-    assert table["seed"].type == table["limit_violations"].type == "int64"
-    for spec, row in zip(specs, table.to_pylist(), strict=True):
-        assert (row.pop("controller"), row.pop("operator")) == (spec.controller, "table1:1")
-        assert (row.pop("seed"), row.pop("setup")) == (0, spec.setup.key)
-        np.testing.assert_equal(row, folder.trajectory(spec).metrics().as_dict())
+    rows = {row["key"]: row for row in folder.read_metrics()}
+    for spec in specs:
+        row = rows[spec.key]
+        assert (row["controller"], row["operator"]) == (spec.controller, "table1:1")
+        assert (row["seed"], row["setup"]) == (0, spec.setup.key)
+        for name, value in folder.trajectory(spec).metrics().as_dict().items():
+            assert row[name] == (None if np.isnan(value) else value)
 
 
-def test_the_manifest_says_what_is_needed_to_play_it_all_again(tmp_path: Path) -> None:
+def test_row_and_manifest_say_what_is_needed_to_play_it_all_again(tmp_path: Path) -> None:
     folder = ResultsFolder(tmp_path)
     setup = Setup(crane=CraneParameters(payload_mass=150.0), max_steps=5)
-    specs = episode_specs(["manual"], ["random"], [4, 5], setup)
+    specs = [
+        EpisodeSpec(
+            controller="manual",
+            operator=operator_program("person:trained"),
+            seed=4,
+            setup=setup,
+            start={"cable_length": 6.0},
+            task="position",
+            practice=practice,
+        )
+        for practice in (None, 3)
+    ]
     compare(specs, folder, jobs=1, command=["evaluate.py", "--jobs", "1"])
 
     def refuse(constant: str) -> None:
         raise AssertionError(f"{constant} is no JSON")
 
+    rows = {row["key"]: row["specification"] for row in folder.read_metrics()}
+    assert [EpisodeSpec.of(json.loads(rows[spec.key])) for spec in specs] == specs
     manifest = json.loads(folder.manifest_file.read_text("utf-8"), parse_constant=refuse)
-    again = [
-        EpisodeSpec(
-            controller=entry["controller"],
-            operator=next(o for o in manifest["operators"] if o["name"] == entry["operator"]),
-            seed=entry["seed"],
-            setup=Setup.of(manifest["setups"][entry["setup"]]),
-        )
-        for entry in manifest["episodes"]
-    ]
-    assert again == specs
+    assert [Setup.of(one) for one in manifest["setups"].values()] == [setup]
     assert manifest["status"] == "complete"
     assert manifest["command"] == ["evaluate.py", "--jobs", "1"]
-    assert manifest["jobs"] == 1
+    assert manifest["code"] == provenance.code_identity()
     assert manifest["duration"] > 0.0
     assert {"oilcrane", "numpy", "mujoco", "gymnasium", "daqp"} <= manifest["versions"].keys()
     assert {"python", "system", "architecture", "processor", "cores"} == (
         manifest["machine"].keys() - {"implementation"}
     )
     assert "git" in manifest
-    for entry in manifest["episodes"]:
-        assert (folder.path / entry["file"]).is_file()
 
 
 def test_the_git_state_is_the_commit_or_none_without_git(

@@ -210,10 +210,11 @@ def test_the_gallery_draws_figs_3_to_7_of_what_finished_as_far_as_it_can(tmp_pat
     folder = ResultsFolder(tmp_path)
     folder.prepare()
     specs = episode_specs(["manual", "linear"], ["table1:2", "random"], [0], Setup(max_steps=150))
-    results = [
-        EpisodeResult(spec, folder.save_episode(spec, play(spec), 0.1, "trajectories"), 0.1)
-        for spec in specs[1:]
-    ]
+    results = []
+    for spec in specs[1:]:
+        trajectory = play(spec)
+        folder.save_trajectory(spec, trajectory)
+        results.append(EpisodeResult(spec, trajectory.metrics(), 0.1))
     failed = EpisodeResult(specs[0], None, 0.1, failure="ValueError: no")
     drawn = draw_gallery([failed, *results], folder, ["png", "svg"])
     assert [file.name for file in drawn.files] == [

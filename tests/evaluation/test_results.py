@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from baselines.evaluation import comparison, dataset
 from baselines.evaluation.comparison import compare
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
@@ -42,12 +43,15 @@ def test_a_folder_where_a_file_should_be_ends_the_run_and_keeps_what_finished(
     assert [result.reused for result in compare(specs, folder, jobs=1)] == [True, True, False]
 
 
-@pytest.mark.parametrize("deleted", [".", "episodes", "episodes/SETUP"])
-def test_a_folder_deleted_under_a_run_is_noticed(deleted: str, tmp_path: Path) -> None:
-    folder, specs = ResultsFolder(tmp_path / "results"), specs_of(2)
-    gone = folder.path / deleted.replace("SETUP", specs[0].setup.key)
+@pytest.mark.parametrize("deleted", [".", "episodes", "trajectories", "episodes/CODE"])
+def test_a_folder_deleted_under_a_run_is_noticed(
+    deleted: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(comparison, "LARGEST_BATCH", 1)
+    folder, specs = ResultsFolder(tmp_path / "results"), specs_of(12)
+    gone = folder.path / deleted.replace("CODE", folder.episodes.path.name)
     watch = after_the_first(lambda: gone.rename(tmp_path / "moved"))
-    with pytest.raises(OSError, match=r"output folder '.*' (cannot be written: No|lacks \d ep)"):
+    with pytest.raises(OSError, match=r"output folder '.*' (cannot be written: No|lacks 1 file)"):
         compare(specs, folder, jobs=1, on_result=watch)
 
 
@@ -59,11 +63,31 @@ def test_two_runs_do_not_write_to_one_folder(tmp_path: Path) -> None:
         pass
 
 
-def test_a_record_whose_numbers_were_changed_is_not_reused(tmp_path: Path) -> None:
-    folder, (spec,) = ResultsFolder(tmp_path), specs_of(1)
-    compare([spec], folder, jobs=1, keep="metrics")
-    assert folder.load_episode(spec, "metrics") is not None
-    record = json.loads(folder.record_file(spec).read_text(encoding="utf-8"))
-    record["metrics"]["IAE"] += 1e-9
-    folder.record_file(spec).write_text(json.dumps(record), encoding="utf-8")
-    assert folder.load_episode(spec, "metrics") is None
+@pytest.mark.parametrize("place", [0, 200, -300, -20, -1])
+def test_a_file_in_which_a_byte_changed_is_cleared_away_and_its_episodes_are_played_again(
+    place: int, tmp_path: Path
+) -> None:
+    folder, specs = ResultsFolder(tmp_path), specs_of(2)
+    compare(specs, folder, jobs=1, keep="metrics")
+    (file,) = folder.episodes.files()
+    content = bytearray(file.read_bytes())
+    content[place] ^= 1
+    file.write_bytes(content)
+    assert not any(result.reused for result in compare(specs, folder, jobs=1, keep="metrics"))
+    assert not file.exists()
+    assert len(folder.read_metrics()) == 2
+
+
+def test_a_copy_of_another_machines_files_joins_a_data_set_in_which_no_episode_stands_twice(
+    tmp_path: Path,
+) -> None:
+    specs = specs_of(4)
+    here, there = ResultsFolder(tmp_path / "here"), ResultsFolder(tmp_path / "there")
+    compare(specs[:3], here, jobs=1, keep="metrics")
+    compare(specs[2:], there, jobs=1, keep="metrics")
+    shutil.copytree(there.episodes.path, here.episodes.path, dirs_exist_ok=True)
+    assert len(here.read_metrics()) == 4
+    results = compare(specs, here, jobs=1, keep="metrics")
+    assert all(result.reused for result in results)
+    keys = [row["key"] for file in here.episodes.files() for row in dataset.read(file)]
+    assert sorted(keys) == sorted(spec.key for spec in specs)

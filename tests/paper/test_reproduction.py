@@ -266,7 +266,8 @@ def test_ctrl_c_ends_with_130_and_keeps_whole_episodes(tmp_path: Path) -> None:
         start_new_session=True,
     )
     deadline = time.monotonic() + 60.0
-    while len(list(tmp_path.glob("defaults/episodes/*/*.json"))) < 3:
+    folder = ResultsFolder(tmp_path / "defaults")
+    while len(folder.read_metrics()) < 3:
         assert process.poll() is None
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -275,8 +276,7 @@ def test_ctrl_c_ends_with_130_and_keeps_whole_episodes(tmp_path: Path) -> None:
     assert process.returncode == 130
     assert "interrupted; the finished episodes are kept" in message
     assert "Traceback" not in message
-    kept = list(tmp_path.glob("defaults/episodes/*/*.json"))
+    kept = folder.read_metrics()
     assert len(kept) >= 3
-    for record in kept:
-        assert json.loads(record.read_text(encoding="utf-8"))["metrics"]["IAE"] > 0.0
+    assert all(row["IAE"] > 0.0 for row in kept)
     assert not list(tmp_path.rglob("*.partial"))
