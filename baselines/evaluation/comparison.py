@@ -195,7 +195,9 @@ def _complete(
     except BaseException as error:
         with suppress(OSError):  # the error that ended it says more
             batches.write()
-        with suppress(OSError):
+        with suppress(OSError):  # more may have been kept than was told
+            count["finished"] = sum(1 for _ in folder.load(specs, keep))
+            count["pending"] = len(specs) - count["finished"] - count["failed"]
             write_manifest("failed" if isinstance(error, OSError) else "interrupted")
         raise
     write_manifest("failed" if count["failed"] else "complete")
