@@ -2,6 +2,8 @@
 
 oilcrane evaluate
 oilcrane evaluate --controllers linear adaptive --operators random --seeds 0:100
+oilcrane evaluate --campaign robustness.toml --dry-run
+oilcrane evaluate --campaign robustness.toml --ray auto
 """
 
 from __future__ import annotations
@@ -9,11 +11,18 @@ from __future__ import annotations
 import functools
 import itertools
 import json
-from collections.abc import Sequence
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
+from baselines.campaign.cluster import play_on_cluster
+from baselines.campaign.forecast import forecast
+from baselines.campaign.plan import Campaign, operator_names, read_campaign, seed_range
 from baselines.commands.terminal import (
     FailedError,
     Job,
@@ -22,20 +31,35 @@ from baselines.commands.terminal import (
     run,
     table_console,
 )
-from baselines.evaluation.comparison import check_controllers, compare, make_ready
+from baselines.evaluation.comparison import check_controllers, compare, complete
 from baselines.evaluation.drawing import Drawn, Format
-from baselines.evaluation.episode_spec import EpisodeSpec, Setup, episode_specs
+from baselines.evaluation.episode_spec import Setup, episode_specs
 from baselines.evaluation.gallery import draw_gallery
 from baselines.evaluation.results import EpisodeResult, ResultsFolder
 from baselines.evaluation.tables import operator_table, summary_table
+from baselines.evaluation.workers import Workers, play_all, processes
 from baselines.mpc.settings import MpcSettings
 from crane_env import CraneParameters
 from crane_env.imperfections.registry import make_imperfections
-from crane_env.operators.table1 import TABLE_1
 from crane_env.parameters import PRESETS
 from crane_env.support.extras import require
 
 PROGRAM = "oilcrane evaluate"
+
+MOST_FAILURES = 10
+"""So many episodes of a campaign that failed are named on the terminal."""
+
+ENTRIES_AS_OPTIONS = (
+    "controllers",
+    "operators",
+    "seeds",
+    "parameters",
+    "nominal",
+    "settings",
+    "imperfections",
+    "max_steps",
+)
+"""Options that a campaign's file stands for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,9 +68,16 @@ class Options:
 
     Every controller meets every operator under every seed. Prints tables; writes metrics and
     trajectories (Parquet), the paper's Figs. 3 to 7 and a manifest (JSON). Ctrl-C keeps the
-    finished episodes, and the same command then goes on from there.
+    finished episodes, and the same command then goes on from there. So it does after any other
+    end: a crash, a power cut, a full disk.
 
     Attributes:
+        campaign: a TOML file that says what is played, instead of the options from controllers to
+            max_steps: all combinations, of which the metrics are kept unless it says otherwise.
+        dry_run: say what would be played, what is there already and how long it takes; play
+            nothing.
+        ray: address of a Ray cluster to play on: HOST:PORT, auto, or local for one that is started
+            here; None is processes on this machine.
         controllers: names of controllers; package.module:factory for one of your own.
         operators: who presses the buttons: table1 (all ten manoeuvres of the paper's Table I),
             table1:N (one of them), manoeuvre, random, stress, script:FILE (CSV or JSON), or
@@ -61,14 +92,18 @@ class Options:
             file with one, of the fields of MpcSettings that differ from the paper's.
         imperfections: of the crane: scenarios such as field or noise, single ones such as
             sensor-delay, each also with a severity, as field:0.5, or as a JSON object.
-        output: folder of the results. Episodes that it holds of the same options and the same code
-            are not played again.
+        output: folder of the results; None is results/evaluate, or results/NAME of a campaign
+            NAME.toml. Episodes that it holds of the same options and the same code are not played
+            again.
         jobs: number of processes; None is one a core.
         max_steps: length of an episode in control periods of 20 ms; None is 1250, 25 s.
         figures: whether to draw the figures.
         format: of the figures; several may be given.
     """
 
+    campaign: Path | None = None
+    dry_run: bool = False
+    ray: str | None = None
     controllers: tuple[str, ...] = ("manual", "linear", "adaptive", "nmpc-a", "nmpc-b", "ltv")
     operators: tuple[str, ...] = ("table1",)
     seeds: tuple[str, ...] = ("0",)
@@ -76,7 +111,7 @@ class Options:
     nominal: str | None = None
     settings: str = "{}"
     imperfections: tuple[str, ...] = ()
-    output: Path = Path("results/evaluate")
+    output: Path | None = None
     jobs: int | None = None
     max_steps: int | None = None
     figures: bool = True
@@ -96,6 +131,31 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
         ImportError: a package is missing; the message names the extra that brings it.
         OSError: a file that cannot be read, or a folder that cannot be written.
     """
+    asked = options_campaign(options) if options.campaign is None else file_campaign(options)
+    check_controllers(asked.specs)
+    name = "evaluate" if options.campaign is None else options.campaign.stem
+    folder = ResultsFolder(options.output or Path("results") / name)
+    jobs = processes(options.jobs)
+    if options.dry_run:
+        return functools.partial(show_forecast, asked, folder, jobs)
+    folder.prepare()
+    if options.ray is None:
+        workers: Workers = functools.partial(play_all, jobs=jobs)
+    else:
+        require("ray", extra="cluster")
+        workers = functools.partial(play_on_cluster, address=options.ray, jobs=jobs)
+    if options.campaign is not None:
+        return functools.partial(play_campaign, asked, folder, workers, command)
+    formats = options.format if options.figures else ()
+    return functools.partial(evaluate, asked, folder, workers, command, formats)
+
+
+def options_campaign(options: Options) -> Campaign:
+    """The comparison that the options describe.
+
+    Raises:
+        ValueError, ImportError, OSError: see `prepare`.
+    """
     setup = Setup(
         crane=crane_parameters(options.parameters, "parameters"),
         nominal=None if options.nominal is None else crane_parameters(options.nominal, "nominal"),
@@ -105,20 +165,114 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     )
     operators = [name for given in options.operators for name in operator_names(given)]
     seeds = itertools.chain.from_iterable(map(seed_range, options.seeds))
-    specs = episode_specs(options.controllers, operators, seeds, setup)
     if options.figures:
         require("matplotlib.figure", extra="results")
-    check_controllers(specs)
-    folder = ResultsFolder(options.output)
-    jobs = make_ready(folder, options.jobs)
-    formats = options.format if options.figures else ()
-    return functools.partial(evaluate, specs, folder, jobs, command, formats)
+    return Campaign(episode_specs(options.controllers, operators, seeds, setup), "trajectories")
+
+
+def file_campaign(options: Options) -> Campaign:
+    """The campaign of a file.
+
+    Raises:
+        ValueError: an option that the file stands for, or as `read_campaign`.
+        OSError: it cannot be read.
+    """
+    assert options.campaign is not None
+    for name in ENTRIES_AS_OPTIONS:
+        if getattr(options, name) != getattr(Options(), name):
+            raise ValueError(
+                f"--{name.replace('_', '-')} does not go with --campaign: its file says what is "
+                "played."
+            )
+    return read_campaign(options.campaign)
+
+
+def show_forecast(asked: Campaign, folder: ResultsFolder, jobs: int) -> None:
+    """Prints what would be played and how long it takes."""
+    shares = forecast(asked.specs, folder, asked.keep)
+    table = require("rich.table", extra="results").Table()
+    headings = ("controller", "steps", "task", "episodes", "there", "each [s]", "left")
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "controller" else "right")
+    for share in shares:
+        controller, steps, task = share.kind
+        table.add_row(
+            controller,
+            str(steps),
+            "yes" if task else "",
+            str(share.episodes),
+            str(share.there),
+            f"{share.duration:.3g}{'' if share.recorded else ' *'}",
+            told_duration(share.time_left / jobs),
+        )
+    table_console().print(table)
+    if not all(share.recorded for share in shares):
+        print("* from a short trial; all others as recorded.")
+    there = sum(share.there for share in shares)
+    left = told_duration(sum(share.time_left for share in shares) / jobs)
+    print(
+        f"{len(asked.specs)} episodes, {there} of them there already; the rest takes about {left} "
+        f"on {jobs} processor(s)."
+    )
+
+
+def told_duration(seconds: float) -> str:
+    """A duration as hours, minutes and seconds."""
+    return str(timedelta(seconds=math.ceil(seconds)))
+
+
+def play_campaign(
+    asked: Campaign, folder: ResultsFolder, workers: Workers, command: Sequence[str]
+) -> None:
+    """Plays a campaign and says where its data set is.
+
+    Raises:
+        FailedError: some episodes failed.
+        KeyboardInterrupt: interrupted; with the number of episodes that are kept.
+    """
+    count: Counter[str] = Counter()
+    failures: list[str] = []
+
+    def note(result: EpisodeResult) -> None:
+        count.update({"reused": result.reused, result.status: 1})
+        if len(failures) < MOST_FAILURES:
+            failures.extend(failure_lines([result]))
+
+    with saying_what_is_kept(asked, folder), progress("episodes", len(asked.specs)) as advance:
+
+        def tell(result: EpisodeResult) -> None:
+            note(result)
+            advance(result)
+
+        complete(asked.specs, folder, workers, keep=asked.keep, command=command, on_result=tell)
+    print(
+        f"{count['finished']} episodes finished, {count['reused']} of them before; "
+        f"{count['failed']} failed."
+    )
+    print(f"Results: {folder.episodes.path}, {folder.manifest_file}.")
+    if more := count["failed"] - len(failures):
+        failures.append(f"{more} more failed; see the columns failure and traceback.")
+    if failures:
+        raise FailedError(*failures)
+
+
+@contextmanager
+def saying_what_is_kept(asked: Campaign, folder: ResultsFolder) -> Iterator[None]:
+    """Lets an interruption of the block say how many episodes are kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        kept = sum(1 for _ in folder.load(asked.specs, asked.keep))
+        raise KeyboardInterrupt(
+            f"{kept} of {len(asked.specs)} episodes are kept in {folder.path}, and the same "
+            "command goes on from there"
+        ) from None
 
 
 def evaluate(
-    specs: Sequence[EpisodeSpec],
+    asked: Campaign,
     folder: ResultsFolder,
-    jobs: int,
+    workers: Workers,
     command: Sequence[str],
     formats: Sequence[Format],
 ) -> None:
@@ -128,15 +282,15 @@ def evaluate(
         FailedError: some episodes or figures failed.
         KeyboardInterrupt: interrupted; with the number of episodes that are kept.
     """
-    try:
-        with progress("episodes", len(specs)) as advance:
-            results = compare(specs, folder, jobs=jobs, command=command, on_result=advance)
-    except KeyboardInterrupt:
-        kept = sum(1 for _ in folder.load(specs, "trajectories"))
-        raise KeyboardInterrupt(
-            f"{kept} of {len(specs)} episodes are kept in {folder.path}, and the same command goes "
-            "on from there"
-        ) from None
+    with saying_what_is_kept(asked, folder), progress("episodes", len(asked.specs)) as advance:
+        results = compare(
+            asked.specs,
+            folder,
+            keep=asked.keep,
+            command=command,
+            on_result=advance,
+            workers=workers,
+        )
     print_tables(results)
     report(results, folder, draw_gallery(results, folder, formats))
 
@@ -173,24 +327,6 @@ def json_object(given: str, must_be: str) -> dict[str, Any]:
 def imperfection(given: str) -> str | dict[str, Any]:
     """A name, or what a JSON object says."""
     return json_object(given, "imperfections must be") if given.lstrip()[:1] == "{" else given
-
-
-def operator_names(given: str) -> list[str]:
-    """All manoeuvres of Table I for the name of the table, else the name itself."""
-    return [f"table1:{n}" for n in range(1, len(TABLE_1) + 1)] if given == "table1" else [given]
-
-
-def seed_range(given: str) -> range:
-    """Seeds of a number or of FIRST:END.
-
-    Raises:
-        ValueError: it is neither.
-    """
-    first, colon, end = given.partition(":")
-    try:
-        return range(int(first), int(end) if colon else int(first) + 1)
-    except ValueError:
-        raise ValueError(f"A seed is a whole number or a range FIRST:END, not {given!r}.") from None
 
 
 def print_tables(results: Sequence[EpisodeResult]) -> None:

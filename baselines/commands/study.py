@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from baselines.commands.evaluate import crane_parameters, seed_range
+from baselines.campaign.plan import seed_range
+from baselines.commands.evaluate import crane_parameters
 from baselines.commands.terminal import FailedError, Job, failure_lines, progress, run
 from baselines.evaluation.comparison import check_controllers, compare, index_values
 from baselines.evaluation.drawing import Format, draw

@@ -12,6 +12,7 @@ Whatever goes wrong is told in one line on standard error.
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import signal
 import sys
@@ -152,21 +153,30 @@ def check_writable(what: str, file: Path) -> None:
 
 @contextmanager
 def progress(label: str, total: int) -> Iterator[Callable[[Any], None]]:
-    """Shows a progress bar on standard error while the block runs.
+    """Shows a progress bar, with the time left, on standard error while the block runs.
 
     Args:
         label: stands before the bar.
         total: number of steps.
 
     Yields:
-        What advances the bar by one step, whatever it is called with.
+        What advances the bar by one step, whatever it is called with; a result that is `reused`
+        does not count for the time left.
 
     Raises:
         ImportError: rich is missing; the message names the extra.
     """
     with progress_bars() as bar:
         task = bar.add_task(label, total=total)
-        yield lambda _: bar.advance(task)
+        reused = itertools.count(1)
+
+        def advance(result: Any) -> None:
+            if getattr(result, "reused", False):
+                bar.reset(task, completed=next(reused))
+            else:
+                bar.advance(task)
+
+        yield advance
 
 
 def progress_bars() -> Progress:

@@ -43,7 +43,9 @@ def check_controllers(specs: Sequence[EpisodeSpec]) -> None:
     """
     foreign_code.forget()
     check_settings(specs)
-    distinct = {(spec.controller, spec.setup.key): spec for spec in specs}.values()
+    distinct = {
+        (spec.controller, spec.setup.believed, spec.setup.settings): spec for spec in specs
+    }.values()
     raised: list[FactoryError] = []
     for spec in distinct:
         try:
@@ -73,10 +75,11 @@ def compare(
     specs: Sequence[EpisodeSpec],
     folder: ResultsFolder,
     *,
-    jobs: int | None,
+    jobs: int | None = None,
     keep: Keep = "trajectories",
     command: Sequence[str] = (),
     on_result: Callable[[EpisodeResult], None] = lambda _: None,
+    workers: Workers | None = None,
 ) -> list[EpisodeResult]:
     """Plays the episodes that the folder does not hold yet and gives the results of all.
 
@@ -87,6 +90,7 @@ def compare(
         keep: what is kept of each episode.
         command: command line, for the manifest.
         on_result: called with every result as it comes, reused ones first.
+        workers: what plays them instead of processes here.
 
     Returns:
         The results in the order of `specs`; an episode that raised is a failed one among them.
@@ -101,7 +105,7 @@ def compare(
         on_result(result)
 
     number = make_ready(folder, jobs)
-    workers = functools.partial(play_all, jobs=number)
+    workers = workers or functools.partial(play_all, jobs=number)
     complete(specs, folder, workers, keep=keep, command=command, on_result=remember)
     return [results[spec.key] for spec in specs]
 
@@ -185,7 +189,7 @@ def _complete(
         missing = [spec for spec in specs if spec.key not in there]
         with folder.writing():
             folder.episodes.clear({spec.key for spec in missing})
-        tasks = [Task(spec, spec.key, folder.path, keep) for spec in missing]
+        tasks = [Task(spec, spec.key, folder.path.absolute(), keep) for spec in missing]
         with closing(workers(tasks)) as played:
             for results in played:
                 batches.add(results)

@@ -222,7 +222,11 @@ def play(spec: EpisodeSpec) -> Trajectory:
     if spec.task is not None:
         options["task"] = spec.task
     try:
-        controller = build_controller(spec) if spec.foreign else _controller(spec.controller, setup)
+        controller = (
+            build_controller(spec)
+            if spec.foreign
+            else _controller(spec.controller, setup.believed, setup.settings)
+        )
         if spec.practice is not None:
             person = json.dumps(spec.operator, sort_keys=True)
             options["operator"] = _practised(
@@ -254,7 +258,7 @@ def build_controller(spec: EpisodeSpec) -> Controller:
     Raises:
         ValueError, ImportError: as `make_controller`.
     """
-    return _controller.__wrapped__(spec.controller, spec.setup)
+    return _controller.__wrapped__(spec.controller, spec.setup.believed, spec.setup.settings)
 
 
 def check_settings(specs: Iterable[EpisodeSpec]) -> None:
@@ -280,16 +284,16 @@ def check_settings(specs: Iterable[EpisodeSpec]) -> None:
 
 
 @functools.lru_cache(maxsize=8)
-def _controller(name: str, setup: Setup) -> Controller:
+def _controller(name: str, believed: CraneParameters, settings: MpcSettings) -> Controller:
     takes: Any = settings_type(name)
-    settings: object = None
+    given: object = None
     if "@" in name:  # a preset's settings are its own
         pass
     elif takes is MpcSettings:
-        settings = setup.settings
+        given = settings
     elif takes is not None and isinstance(getattr(takes.of(None), "cost", None), StageCost):
-        settings = {"cost": setup.settings.cost}
-    return make_controller(name, parameters=setup.believed, settings=settings)
+        given = {"cost": settings.cost}
+    return make_controller(name, parameters=believed, settings=given)
 
 
 @functools.lru_cache(maxsize=4)
@@ -317,7 +321,7 @@ def _practised(
     operator = make_operator(json.loads(person))
     if not isinstance(operator, PersonOperator):
         raise ValueError(f"Only persons can practise, not the operator {person}.")
-    trying = _controller(controller, setup)
+    trying = _controller(controller, setup.believed, setup.settings)
     return practise(
         operator.program,
         trying,

@@ -17,8 +17,8 @@ import crane_env
 
 DISTRIBUTION = "oilcrane"
 
-PRESENTATION_EXTRAS = frozenset({"results", "film", "docs", "dev"})
-"""Extras whose packages store, draw or check results but do not make them."""
+PRESENTATION_EXTRAS = frozenset({"results", "film", "cluster", "docs", "dev"})
+"""Extras whose packages store, draw, fetch or check results but do not make them."""
 
 
 def package_versions() -> dict[str, str]:

@@ -223,8 +223,13 @@ class ResultsFolder:
             figure.unlink()
 
     def write_manifest(self, manifest: dict[str, Any]) -> None:
-        """Writes the manifest."""
-        write_json(self.manifest_file, manifest)
+        """Writes the manifest.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        with self.writing():
+            write_json(self.manifest_file, manifest)
 
     def read_manifest(self) -> dict[str, Any]:
         """The manifest.
@@ -235,11 +240,15 @@ class ResultsFolder:
         manifest: dict[str, Any] = json.loads(self.manifest_file.read_text(encoding="utf-8"))
         return manifest
 
+    def all_rows(self) -> Iterator[dict[str, Any]]:
+        """Rows of all states of the code."""
+        for folder in sorted((self.path / "episodes").glob("code=*")):
+            yield from Dataset(folder).rows()
+
     def others(self, specs: Iterable[EpisodeSpec]) -> int:
-        """Number of rows that are kept beside those of these episodes, of any state of the code."""
+        """Number of rows beside those of these episodes, of all states of the code."""
         own = {spec.key for spec in specs}
-        folders = (self.path / "episodes").glob("code=*")
-        return sum(row["key"] not in own for one in folders for row in Dataset(one).rows())
+        return sum(row["key"] not in own for row in self.all_rows())
 
     @contextmanager
     def writing(self) -> Iterator[None]:

@@ -14,7 +14,8 @@ from typing import Any
 
 import pytest
 
-from baselines.commands.evaluate import json_object, main, seed_range
+from baselines.campaign.plan import seed_range
+from baselines.commands.evaluate import json_object, main
 from baselines.evaluation import dataset
 from baselines.evaluation.results import ResultsFolder
 from crane_env import Trajectory
