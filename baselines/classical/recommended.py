@@ -8,16 +8,22 @@ image, whatever the cable does: the payload begins late and stops late by the sa
 displaced by the integral of w. S is the solution, at one length l and found once, of
 
     minimise    integral of (1 - S) dt + mu integral of u^2 dt        u = S' + l S''' / g
-    subject to  |S'| <= g theta_max,  0 <= S <= 1,  |u| <= share of a_max at the longest cable
+    subject to  |S'| <= g theta_max,  0 <= S <= 1,  |u| <= a_max at the longest cable
 
 that is the shortest lag at a price on the effort, with S''' constant over intervals of a few
 control periods: a quadratic program.
 
 The feedback is that of `lqr_integral` on the deviation from the plan, so that the payload is led
 back not to the planned speed only, but to where the plan has it. Displacement lost to the elastic
-cable, to the hoist or at a limit of the drive is made good; a wind that leans the cable displaces
-the payload by what balances it and no more. Deviations beyond `FORGIVEN` are forgotten: a trolley
-that stood at its limit switch does not catch up.
+cable, to the hoist or at a limit of the drive is made good. Deviations beyond `FORGIVEN` are
+forgotten: a trolley that stood at its limit switch does not catch up.
+
+A lean b that stays, of a steady wind or a sensor that is askew, is told apart by its persistence,
+
+    b' = (theta - theta_d - b) / tau_b
+
+and counts neither as sway nor as a displacement of the payload: otherwise the feedback would drive
+the trolley against the wind for ever.
 """
 
 from __future__ import annotations
@@ -47,9 +53,6 @@ from crane_env.support.fields import check_fields, from_fields
 INTERVALS = 80
 """Of constant S''' in a course."""
 
-USED = 0.8
-"""Share of the drive's acceleration that the plan uses; the rest is the feedback's."""
-
 FORGIVEN = 0.5
 """Largest deviation that is made good [m]."""
 
@@ -63,6 +66,7 @@ class RecommendedSettings:
             ramp that sway and drive allow, and half a sway more.
         effort_weight: mu [s^3/m].
         sway_limit: theta_max of the plan [rad].
+        lean_time: tau_b [s].
         feedback: what the feedback minimises on the deviation from the plan.
 
     Raises:
@@ -71,9 +75,10 @@ class RecommendedSettings:
 
     duration: float | None = None
     effort_weight: float = 0.02
-    sway_limit: float = math.radians(4.3)
+    sway_limit: float = math.radians(4.35)
+    lean_time: float = 8.0
     feedback: LqrIntegralSettings = field(
-        default_factory=lambda: LqrIntegralSettings(integral_weight=0.5)
+        default_factory=lambda: LqrIntegralSettings(integral_weight=1.0)
     )
 
     def __post_init__(self) -> None:
@@ -82,6 +87,7 @@ class RecommendedSettings:
             check_fields(self, within, ("duration",), 0.1, 1000.0, "s")
         check_fields(self, within, ("effort_weight",), 1e-6, 1e6, "s^3/m")
         check_fields(self, within, ("sway_limit",), 1e-3, 1.0, "rad")
+        check_fields(self, within, ("lean_time",), 0.1, 1e6, "s")
         object.__setattr__(self, "feedback", LqrIntegralSettings.of(self.feedback))
 
     @classmethod
@@ -108,7 +114,7 @@ def course(crane: CraneParameters, settings: RecommendedSettings) -> NDArray[np.
         ImportError: DAQP is not installed; the message names the extra.
     """
     period, g, speed = crane.control_period, crane.gravity, crane.travel_speed
-    steepest, most = g * settings.sway_limit, USED * crane.acceleration_max
+    steepest, most = g * settings.sway_limit, crane.acceleration_max
     half_turn = 0.5 * crane.sway_period(crane.cable_length_initial)
     duration = settings.duration or speed / min(steepest, most) + half_turn
     held = math.ceil(duration / (period * INTERVALS))
@@ -174,6 +180,7 @@ class Recommended(Controller):
     def __init__(self, crane: CraneParameters, settings: RecommendedSettings) -> None:
         self._gravity, self._period = crane.gravity, crane.control_period
         self._length_min = crane.cable_length_min
+        self._learned = self._period / settings.lean_time
         self._planner = Planner(course(crane, settings))
         self._feedback = GainSchedule(
             crane, lambda length: integral_regulator(crane, settings.feedback, length).gain
@@ -187,21 +194,24 @@ class Recommended(Controller):
         self._speed = 0.0  # y_d now
         self._planned = (0.0, 0.0, 0.0)  # v_d, theta_d and theta_d' now
         self._place: float | None = None  # x_d now
+        self._lean = 0.0  # b
 
     def act(self, observation: NDArray[np.float64]) -> NDArray[np.float64]:
         """Acceleration along the plan and back to it; see `Controller.act`."""
         seen = finite_observation(observation)
         length, g = assumed_length(seen, self._length_min), self._gravity
-        position = float(payload_position(seen.trolley_position, length, seen.sway_angle))
+        velocity, sway, sway_rate = self._planned
+        self._lean += self._learned * (seen.sway_angle - sway - self._lean)
+        upright = seen.sway_angle - self._lean
+        position = float(payload_position(seen.trolley_position, length, upright))
         error = 0.0 if self._place is None else position - self._place
         error = min(max(error, -FORGIVEN), FORGIVEN)
-        velocity, sway, sway_rate = self._planned
         back = self._feedback.acceleration(
             length,
             (
                 error,
                 seen.trolley_velocity - velocity,
-                seen.sway_angle - sway,
+                upright - sway,
                 seen.sway_rate - sway_rate,
             ),
         )

