@@ -24,8 +24,8 @@ CARD = f"""{BEGIN}
 elastic cable, an operator who presses buttons, and a controller that drives the trolley. Simulated,
 not measured. Played with {{versions}}.
 
-| operator | controller | task | payload | episodes | time [s] |
-|---|---|---|---|---|---|
+| operator | controller | task | payload | imperfections | episodes | time [s] |
+|---|---|---|---|---|---|---|
 {{rows}}
 
 Episodes whose simulation failed in the last row, and which say nothing of their controllers:
@@ -105,12 +105,13 @@ def write_data_card(folder: str | Path) -> Path:
 
 
 def _kind(recorded: Trajectory) -> tuple[str, ...]:
-    """Operator, controller, task and payload of an episode, as the card's table has them."""
+    """What an episode was of, as the card's table has it."""
     task, origin = recorded.task, recorded.origin
     words = (
         str(origin.operator.get("name", "")),
         origin.controller,
         "none" if task is None else f"{len(task.goals)} goals, {len(task.obstacles)} obstacles",
         f"{recorded.parameters.payload_mass:g} kg",
+        ", ".join(f"{one.name}:{one.severity:g}" for one in origin.imperfections) or "none",
     )
     return tuple(word.replace("|", "/") for word in words)

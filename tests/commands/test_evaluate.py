@@ -215,6 +215,8 @@ BAD_INPUT = {
     "seed": (("--seeds", "one"), "A seed is a whole number or a range FIRST:END, not 'one'"),
     "negative": (("--seeds=-1",), "A seed must be a whole number of at least 0"),
     "none": (("--seeds", "3:3"), "nothing to play"),
+    "imperfection": (("--imperfections", "rust"), "Unknown imperfection 'rust'; valid: field, noi"),
+    "twice": (("--imperfections", "field", '{"name": "backlash"}'), "'backlash' is given twice"),
     "jobs": (("--jobs", "0"), "jobs must be a whole number of at least 1, not 0"),
     "steps": (("--max-steps", "0"), "max_steps must be a whole number of at least 1, not 0"),
 }

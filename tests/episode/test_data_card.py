@@ -32,8 +32,8 @@ def folder(tmp_path: Path) -> Path:
 def test_the_card_counts_what_is_there_and_can_be_written_again(folder: Path) -> None:
     card = write_data_card(folder)
     text = card.read_text()
-    assert "| random | man/ual | none | 100 kg | 2 | 2.0 |" in text
-    assert "| table1:1 | man/ual | none | 100 kg | 1 | 1.0 |" in text
+    assert "| random | man/ual | none | 100 kg | none | 2 | 2.0 |" in text
+    assert "| table1:1 | man/ual | none | 100 kg | none | 1 | 1.0 |" in text
     assert "3 episodes" in text
     assert "no recordings: 1." in text
     assert "| `sway_angle` | rad |" in text

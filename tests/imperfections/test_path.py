@@ -19,6 +19,7 @@ from crane_env.environment.report import StepRecord
 from crane_env.imperfections.registry import PARTS, SCENARIOS, make_imperfections, scaled
 from crane_env.tasks.drawn import FAMILIES
 
+FIELD = {"imperfections": "field"}
 OPERATORS = ["random", "stress", "manoeuvre"]
 STEPS = 120
 ACTIONS = np.random.default_rng(0).uniform(-3.0, 3.0, (STEPS, 4, 1))
@@ -204,6 +205,27 @@ def test_a_masked_reset_leaves_the_other_cranes_alone() -> None:
     for actions in ACTIONS[30:]:
         ours, theirs = one.step(actions)[0], other.step(actions)[0]
         assert np.array_equal(ours[~mask], theirs[~mask])
+
+
+def test_one_crane_among_plain_ones_is_given_imperfections_for_an_episode() -> None:
+    vector = gymnasium.make_vec("OILCrane-v0", num_envs=4)
+    plain = gymnasium.make_vec("OILCrane-v0", num_envs=4)
+    single = gymnasium.make("OILCrane-v0")
+    for env in (vector, plain):
+        env.reset(seed=3)
+        for actions in ACTIONS[:30]:
+            env.step(actions)
+    mask = np.array([False, True, False, False])
+    ours, info = vector.reset(seed=[None, 50, None, None], options={"reset_mask": mask, **FIELD})
+    theirs = plain.reset(seed=[None, 50, None, None], options={"reset_mask": mask})[0]
+    alone, said = single.reset(seed=50, options=FIELD)
+    assert np.array_equal(info["measurement"][1], said["measurement"])
+    for actions in ACTIONS[30:]:
+        assert np.array_equal(ours[1], alone)
+        assert np.array_equal(ours[~mask], theirs[~mask])
+        ours, theirs = vector.step(actions)[0], plain.step(actions)[0]
+        alone = single.step(actions[1])[0]
+    assert "truth" not in vector.reset()[1], "the next episode is plain again"
 
 
 def fuzz(steps: int, count: int) -> None:
