@@ -272,7 +272,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         path, mass = None, parameters.payload_mass
         obstacles = () if task is None else task.obstacles
         if imperfections:
-            path = SignalPath(1)
+            path = SignalPath([parameters])
             path.begin([0], [imperfections], [Episode(number, parameters, state)])
             mass = path.payload_masses(np.zeros(1)).item()
             obstacles += path.obstacles(0)

@@ -465,7 +465,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         obstacles = [task.obstacles if task else () for task in tasks]
         laden = cranes
         if any(parts) and self._path is None:
-            self._path = SignalPath(self.num_envs)
+            self._path = SignalPath(self._plant.cranes)
             self._references, self._measured = self._operator.references.copy(), None
         if self._path is not None:
             episodes = [

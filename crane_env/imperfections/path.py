@@ -39,20 +39,22 @@ class SignalPath:
     """The imperfections of N cranes; a crane that is without one is as if there were none.
 
     Args:
-        count: number of cranes, N; they are without imperfections until `begin` gives them some.
+        cranes: N of them; they are without imperfections until `begin` gives them some.
 
     Attributes:
         imperfections: of each crane in its present episode, in the order of `PARTS`.
     """
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, cranes: Sequence[CraneParameters]) -> None:
+        count = len(cranes)
         self.imperfections: list[tuple[Imperfection, ...]] = [()] * count
         self._parts: dict[str, Part] = {}
         self._owners: dict[str, NDArray[np.bool_]] = {}
-        self._highest = np.full((count, len(CraneState._fields)), np.inf)
-        self._lowest = -self._highest
-        self._limit = np.full(count, np.inf)
-        self._masses = np.ones(count)
+        self._highest = np.zeros((count, len(CraneState._fields)))
+        self._lowest = self._highest.copy()
+        self._limit, self._masses = np.zeros((2, count))
+        for crane, parameters in enumerate(cranes):
+            self._suit(crane, parameters)
         self._buttons: list[tuple[ButtonsPart, Owners]] = []
         self._commands: list[tuple[CommandPart, Owners]] = []
         self._hoists: list[tuple[HoistPart, Owners]] = []
@@ -76,9 +78,7 @@ class SignalPath:
         count = len(self.imperfections)
         for crane, parts, episode in zip(cranes, given, episodes, strict=True):
             self.imperfections[crane] = tuple(parts)
-            self._highest[crane] = largest_state(episode.parameters)
-            self._limit[crane] = episode.parameters.acceleration_max
-            self._masses[crane] = episode.parameters.payload_mass
+            self._suit(crane, episode.parameters)
             active = {part.name: part for part in parts if part.severity > 0.0}
             for name in active.keys() - self._parts.keys():
                 self._parts[name] = active[name].part(count)
@@ -87,8 +87,6 @@ class SignalPath:
                 self._owners[name][crane] = name in active
                 if name in active:
                     part.begin(crane, active[name], episode)
-        self._lowest = -self._highest
-        self._lowest[:, CABLE_LENGTH] = 0.0
         # In the order in which signals meet them, with their owners; None: all cranes.
         present = [
             (self._parts[name], None if self._owners[name].all() else self._owners[name])
@@ -101,6 +99,14 @@ class SignalPath:
         self._forces = [(p, o) for p, o in present if isinstance(p, ForcePart)]
         self._payloads = [(p, o) for p, o in present if isinstance(p, PayloadPart)]
         self._measurements = [(p, o) for p, o in present if isinstance(p, MeasurementPart)]
+
+    def _suit(self, crane: int, parameters: CraneParameters) -> None:
+        """Takes from a crane's parameters what holds whatever parts it has."""
+        self._highest[crane] = largest_state(parameters)
+        self._lowest[crane] = -self._highest[crane]
+        self._lowest[crane, CABLE_LENGTH] = 0.0
+        self._limit[crane] = parameters.acceleration_max
+        self._masses[crane] = parameters.payload_mass
 
     @property
     def touches_buttons(self) -> bool:
@@ -211,7 +217,7 @@ def check_imperfections(parts: Sequence[Imperfection], parameters: CraneParamete
     """
     if parts:
         start = AT_REST.coordinates(parameters).state
-        SignalPath(1).begin([0], [parts], [Episode(0, parameters, start)])
+        SignalPath([parameters]).begin([0], [parts], [Episode(0, parameters, start)])
 
 
 def _of_owners(owners: Owners, which: Which, changed: Any, unchanged: Any) -> Any:
