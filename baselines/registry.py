@@ -62,6 +62,7 @@ CONTROLLERS: dict[str, str] = {
     "shaper-um-zv": "baselines.classical.shaper:um_zv",
     "flat": "baselines.classical.flat:flat",
     "recommended": "baselines.classical.recommended:recommended",
+    "gambler": "baselines.limits.gambler:gambler",
 }
 """Name of each controller and where its factory is."""
 

@@ -42,6 +42,9 @@ COMMANDS = {
     "study": Command(
         "study", "mpc,results", "lets persons bring payloads to places with every controller"
     ),
+    "limit": Command(
+        "rating.limit", "mpc,results", "computes how small the IAE of any policy can be, in classes"
+    ),
     "train": Command("train", "results,rl", "trains a reinforcement learner, or exports one"),
     "compare-learners": Command(
         "compare_learners", "mpc,policies,results", "compares reinforcement learning with the MPCs"

@@ -12,26 +12,27 @@ import dataclasses
 import faulthandler
 import functools
 import itertools
+import json
 import math
 import multiprocessing
 import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, as_completed, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, Protocol, TypeVar
 
 import baselines
 import crane_env
 from baselines.evaluation.episode_spec import EpisodeSpec, Setup, play
 from baselines.evaluation.foreign_code import Reads
-from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
+from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder, write_json
 from crane_env import Trajectory
 from crane_env.support import checks
 from crane_env.support.extras import require
@@ -120,6 +121,14 @@ Ended = Mapping[Handle, EpisodeResult | Lost | OSError]
 """How some of them ended; an OSError where a trajectory could not be kept."""
 
 
+class Keyed(Hashable, Protocol):
+    """A task whose result depends on its key alone."""
+
+    @property
+    def key(self) -> str:
+        """Digest of the task and the code."""
+
+
 class StoppedError(SystemExit):
     """The pool stops this worker; files half written go on the way out."""
 
@@ -166,13 +175,7 @@ def play_all(
         OSError: a trajectory cannot be kept.
     """
     pebble = require("pebble", extra="results")
-    with environment(ONE_THREAD), TemporaryDirectory() as diary:
-        pool = pebble.ProcessPool(
-            max_workers=max(1, min(jobs, len(tasks))),
-            initializer=prepare,
-            initargs=(import_paths(),),
-            context=multiprocessing.get_context("spawn"),
-        )
+    with TemporaryDirectory() as diary, process_pool(max(1, min(jobs, len(tasks)))) as pool:
 
         def start(task: Task) -> Future[EpisodeResult]:
             noted = dataclasses.replace(task, diary=Path(diary, task.key))
@@ -196,8 +199,68 @@ def play_all(
             done, _ = wait(waiting, timeout=TICK, return_when=FIRST_COMPLETED)
             return {future: outcome(future, waiting[future]) for future in done}
 
+        yield from in_turn(tasks, start, ended, lambda: AHEAD * jobs)
+
+
+def keep_all(
+    work: Callable[[Any], Any],
+    tasks: Sequence[Keyed],
+    folder: Path,
+    jobs: int,
+    watch: Callable[[Any], None],
+) -> list[Any]:
+    """Does other work than episodes side by side, as far as a folder does not hold it yet.
+
+    Args:
+        work: a function of a module, which gives plain data of a task.
+        tasks: what it is done to.
+        folder: where a JSON file of each task lies, named by its key; it need not exist yet.
+        jobs: number of processes, at least 1.
+        watch: is told of every task once.
+
+    Returns:
+        The data of each task, in order.
+
+    Raises:
+        ImportError: pebble is missing; the message names the extra.
+        OSError: the folder cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {task: folder / f"{task.key}.json" for task in tasks}
+    missing = [task for task, file in files.items() if not file.exists()]
+    for task in files:
+        if task not in missing:
+            watch(task)
+    if missing:
+        with process_pool(min(jobs, len(missing))) as pool:
+            for future in as_completed(
+                [pool.schedule(keep, args=(work, task, files[task])) for task in missing]
+            ):
+                watch(future.result())
+    return [json.loads(files[task].read_text(encoding="utf-8")) for task in tasks]
+
+
+def keep(work: Callable[[Any], Any], task: Keyed, file: Path) -> None:
+    """Does a task and keeps what comes of it."""
+    write_json(file, work(task))
+
+
+@contextmanager
+def process_pool(workers: int) -> Iterator[Any]:
+    """A pool of spawned processes, one thread each, which are stopped when the block ends.
+
+    Raises:
+        ImportError: pebble is missing; the message names the extra.
+    """
+    with environment(ONE_THREAD):
+        pool = require("pebble", extra="results").ProcessPool(
+            max_workers=workers,
+            initializer=prepare,
+            initargs=(import_paths(),),
+            context=multiprocessing.get_context("spawn"),
+        )
         try:
-            yield from in_turn(tasks, start, ended, lambda: AHEAD * jobs)
+            yield pool
         finally:
             pool.stop()
             pool.join()

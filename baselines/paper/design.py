@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
-import multiprocessing
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import as_completed
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -17,15 +14,13 @@ import numpy as np
 
 from baselines.evaluation.episode_spec import digest
 from baselines.evaluation.provenance import code_identity
-from baselines.evaluation.results import write_json
 from baselines.evaluation.statistics import Interval, share_interval
-from baselines.evaluation.workers import ONE_THREAD, environment, import_paths, prepare
+from baselines.evaluation.workers import keep_all
 from baselines.paper.claims import CLAIMS
 from baselines.paper.evidence import Evidence
 from baselines.paper.readings import DEFAULT, LEVELS, POINTS, Reading, own_horizons, turned_point
 from baselines.paper.readings import walks as random_walks
 from baselines.paper.screen import grouped, screened
-from crane_env.support.extras import require
 
 Grid = Literal["none", "small", "full"]
 """How much is screened."""
@@ -199,49 +194,23 @@ def screen(
     Raises:
         OSError: the folder cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    files = {task: folder / f"{task.key}.json" for task in tasks}
-    missing = {task: file for task, file in files.items() if not file.exists()}
-    for task in tasks:
-        if task not in missing:
-            watch(task)
-    if missing:
-        _screen_side_by_side(missing, jobs, watch)
+    found = keep_all(kept_outcomes, tasks, folder, jobs, watch)
     kept = {
-        task: tuple(map(_outcome, json.loads(file.read_text(encoding="utf-8"))))
-        for task, file in files.items()
+        task: tuple(map(_outcome, outcomes)) for task, outcomes in zip(tasks, found, strict=True)
     }
     walks = tuple(outcomes for task, outcomes in kept.items() if task.is_walk)
     own = tuple(o for task, outcomes in kept.items() if not task.is_walk for o in outcomes)
     return Screening(walks, own)
 
 
-def _screen_side_by_side(
-    missing: Mapping[ScreenTask, Path], jobs: int, watch: Callable[[object], None]
-) -> None:
-    with environment(ONE_THREAD):
-        pool = require("pebble", extra="results").ProcessPool(
-            max_workers=min(jobs, len(missing)),
-            initializer=prepare,
-            initargs=(import_paths(),),
-            context=multiprocessing.get_context("spawn"),
-        )
-        try:
-            for future in as_completed([pool.schedule(keep, args=job) for job in missing.items()]):
-                watch(future.result())
-        finally:
-            pool.stop()
-            pool.join()
-
-
-def keep(task: ScreenTask, file: Path) -> None:
-    """Screens readings and keeps what came of them."""
+def kept_outcomes(task: ScreenTask) -> list[dict[str, Any]]:
+    """What came of the readings of a task, as plain data."""
     found = {
         reading: outcome(reading, evidence)
         for group in grouped(task.readings)
         for reading, evidence in zip(group, screened(group), strict=True)
     }
-    write_json(file, [dataclasses.asdict(found[reading]) for reading in task.readings])
+    return [dataclasses.asdict(found[reading]) for reading in task.readings]
 
 
 def outcome(reading: Reading, evidence: Evidence) -> ReadingOutcome:

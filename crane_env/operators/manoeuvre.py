@@ -33,7 +33,7 @@ import numpy as np
 
 from crane_env.observation import CraneState
 from crane_env.operators.base import LONGEST_TIME, ButtonEvent, Press, press_events
-from crane_env.operators.dead_reckoning import hoist_axis, trolley_axis
+from crane_env.operators.dead_reckoning import Axis, hoist_axis, trolley_axis
 from crane_env.operators.table1 import HOIST_PRESS_DURATION, ManoeuvreTimes
 from crane_env.parameters import CraneParameters
 from crane_env.support.checks import not_negative, within
@@ -124,28 +124,49 @@ class RandomManoeuvre:
         self, rng: np.random.Generator, start: CraneState, parameters: CraneParameters
     ) -> Iterator[ButtonEvent]:
         """Six events or fewer; see `Program.events`."""
-        t1, t2, t3, t4 = self.draw(rng)
+        times = self.draw(rng)
         travel = -1 if rng.random() < self.backward_probability else 1
-        # A press may count one control period longer than it lasts: both its ends are rounded up.
-        rounding = parameters.control_period
-
         trolley = trolley_axis(parameters, self.trolley_margin)
-        at_press = trolley.move(start.trolley_position, start.trolley_velocity, 0, t1)
-        longest_travel = trolley.longest_press(*at_press, travel) - rounding
-
         hoist = hoist_axis(parameters, self.hoist_margin)
-        at_lift = hoist.move(start.cable_length, start.cable_rate, 0, t2)
-        lift = min(HOIST_PRESS_DURATION, hoist.longest_press(*at_lift, -1) - rounding)
-        at_release = hoist.move(*at_lift, -1, max(lift, 0.0))
-        at_lower = hoist.move(*at_release, 0, t4 - t2 - max(lift, 0.0))
-        lower = min(HOIST_PRESS_DURATION, hoist.longest_press(*at_lower, 1) - rounding)
+        return iter(press_events(presses_within(times, travel, start, parameters, trolley, hoist)))
 
-        presses = (
-            Press("forward" if travel > 0 else "backward", t1, min(t3, t1 + longest_travel)),
-            Press("up", t2, t2 + lift),
-            Press("down", t4, t4 + lower),
-        )
-        return iter(press_events(presses))
+
+def presses_within(
+    times: ManoeuvreTimes,
+    travel: int,
+    start: CraneState,
+    parameters: CraneParameters,
+    trolley: Axis,
+    hoist: Axis,
+) -> tuple[Press, Press, Press]:
+    """Presses of a manoeuvre, shortened where they would lead past a limit.
+
+    Args:
+        times: of the manoeuvre.
+        travel: +1 forward, -1 backward.
+        start: state of the crane at time 0.
+        parameters: the crane.
+        trolley: its trolley and where it may go.
+        hoist: its hoist and where it may go.
+    """
+    t1, t2, t3, t4 = times
+    # A press may count one control period longer than it lasts: both its ends are rounded up.
+    rounding = parameters.control_period
+
+    at_press = trolley.move(start.trolley_position, start.trolley_velocity, 0, t1)
+    longest_travel = trolley.longest_press(*at_press, travel) - rounding
+
+    at_lift = hoist.move(start.cable_length, start.cable_rate, 0, t2)
+    lift = min(HOIST_PRESS_DURATION, hoist.longest_press(*at_lift, -1) - rounding)
+    at_release = hoist.move(*at_lift, -1, max(lift, 0.0))
+    at_lower = hoist.move(*at_release, 0, t4 - t2 - max(lift, 0.0))
+    lower = min(HOIST_PRESS_DURATION, hoist.longest_press(*at_lower, 1) - rounding)
+
+    return (
+        Press("forward" if travel > 0 else "backward", t1, min(t3, t1 + longest_travel)),
+        Press("up", t2, t2 + lift),
+        Press("down", t4, t4 + lower),
+    )
 
 
 def _between(low: float, high: float, share: float) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 from crane_env.observation import CraneState
 from crane_env.operators.base import ButtonEvent, Operator, Program, ScheduledOperator
 from crane_env.operators.manoeuvre import RandomManoeuvre
+from crane_env.operators.memoryless import MemorylessManoeuvre
 from crane_env.operators.person.operator import PersonOperator
 from crane_env.operators.person.person import PERSONS, Person
 from crane_env.operators.recording import RecordedButtons, read_recording
@@ -29,13 +30,16 @@ TABLE_1_NUMBERS = [str(number) for number in range(1, len(TABLE_1) + 1)]
 """What may follow "table1:"."""
 
 VALID_NAMES = (
-    f"random, stress, manoeuvre, table1:1 … table1:{len(TABLE_1)}, person:{'|'.join(PERSONS)}, "
-    "script:FILE, recording:FILE, package.module:factory"
+    f"random, stress, manoeuvre, memoryless, table1:1 … table1:{len(TABLE_1)}, "
+    f"person:{'|'.join(PERSONS)}, script:FILE, recording:FILE, package.module:factory"
 )
 NOWHERE = CraneState(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 """Start of a recording of which all fields are yet to be given."""
 
-FAMILIES = ("random", "stress", "manoeuvre", "table1", "person", "script", "recording")
+FAMILIES = (
+    *("random", "stress", "manoeuvre", "memoryless"),
+    *("table1", "person", "script", "recording"),
+)
 """What the names of operators begin with; no module of a factory is looked for under these."""
 
 
@@ -44,7 +48,8 @@ def make_operator(spec: OperatorSpec) -> Operator:
 
     Args:
         spec: a name: "random" or "stress" (see `RandomButtons`), "manoeuvre" (`RandomManoeuvre`),
-            "table1:1" to "table1:10" (`Table1Manoeuvre`), "script:FILE" (`ButtonScript`),
+            "memoryless" (`MemorylessManoeuvre`), "table1:1" to "table1:10" (`Table1Manoeuvre`),
+            "script:FILE" (`ButtonScript`),
             "recording:FILE" (`RecordedButtons`), or "package.module:factory", a function of your
             own that takes nothing and returns a program or an operator; a mapping of a name and
             fields of that program, as `dataclasses.asdict` makes it; a program; an operator, which
@@ -155,6 +160,8 @@ def _program(name: object, fields: Mapping[str, Any]) -> Any:
             program = RandomButtons.stress()
         case "manoeuvre", "", "":
             program = RandomManoeuvre()
+        case "memoryless", "", "":
+            program = MemorylessManoeuvre()
         case "table1", ":", number if number in TABLE_1_NUMBERS:
             program = Table1Manoeuvre(int(number))
         case "person", ":", skill if skill in PERSONS:

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from crane_env.episode.trajectory import Trajectory
 from crane_env.observation import CraneState
 from crane_env.operators.manoeuvre import RandomManoeuvre
+from crane_env.operators.memoryless import MemorylessManoeuvre
 from crane_env.operators.person.person import Person
 from crane_env.operators.recording import RecordedButtons, read_recording
 from crane_env.operators.registry import make_operator
@@ -31,6 +32,7 @@ START = CraneState(0.0, 0.0, 8.0, 0.0, 0.0, 0.0)
 NAMES = (
     "random",
     "manoeuvre",
+    "memoryless",
     "table1:3",
     "person:trained",
     "script",
@@ -40,7 +42,7 @@ NAMES = (
 )
 DESCRIBED = [
     f.name
-    for kind in (ButtonHabits, RandomManoeuvre, Person, RecordedButtons)
+    for kind in (ButtonHabits, RandomManoeuvre, MemorylessManoeuvre, Person, RecordedButtons)
     for f in dataclasses.fields(kind)
 ]
 FIELDS = ("name", "time", "buttons", "schedule", "number", "travel", "hoist", *DESCRIBED)

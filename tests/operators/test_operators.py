@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from crane_env.observation import CraneState
 from crane_env.operators.base import RELEASED, ButtonEvent, Buttons, ScheduledOperator
 from crane_env.operators.manoeuvre import RandomManoeuvre
+from crane_env.operators.memoryless import MemorylessManoeuvre
 from crane_env.operators.recording import RecordedButtons
 from crane_env.operators.registry import make_operator, operator_program, own_operator
 from crane_env.operators.script import ButtonScript, write_script
@@ -31,8 +32,8 @@ from tests.operators.nominal_crane import at_rest
 PAPER = CraneParameters.paper()
 PRESSED = Buttons(forward=True)
 VALID = (
-    "random, stress, manoeuvre, table1:1 … table1:10, person:novice|trained|expert, script:FILE, "
-    "recording:FILE, package.module:factory"
+    "random, stress, manoeuvre, memoryless, table1:1 … table1:10, "
+    "person:novice|trained|expert, script:FILE, recording:FILE, package.module:factory"
 )
 
 PROGRAMS = [
@@ -40,6 +41,7 @@ PROGRAMS = [
     RandomButtons.stress(),
     RandomButtons(hoist=ButtonHabits(pause_median=7.0), travel=ButtonHabits(slip_min=0.1)),
     RandomManoeuvre(),
+    MemorylessManoeuvre(press_rate=0.3),
     RandomManoeuvre(backward_probability=0.5, travel_press_max=5.0),
     Table1Manoeuvre(1),
     Table1Manoeuvre(10),
@@ -66,6 +68,7 @@ def program_of(spec: Any) -> Any:
         ("random", RandomButtons()),
         ("stress", RandomButtons.stress()),
         ("manoeuvre", RandomManoeuvre()),
+        ("memoryless", MemorylessManoeuvre()),
         *((f"table1:{number}", Table1Manoeuvre(number)) for number in range(1, 11)),
     ],
 )

@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from baselines import make_controller
-from baselines.paper.design import Screening, ScreenTask, keep, level_scores, outcome, screen
+from baselines.evaluation.workers import keep
+from baselines.paper.design import (
+    Screening,
+    ScreenTask,
+    kept_outcomes,
+    level_scores,
+    outcome,
+    screen,
+)
 from baselines.paper.readings import DEFAULT, Reading, walks
 from baselines.paper.screen import constant_length, law, rides, screened
 from crane_env import CraneParameters, run_episode
@@ -99,7 +107,7 @@ def test_what_was_screened_is_kept_and_not_screened_again(tmp_path: Path) -> Non
     tasks = [ScreenTask(walks(1, np.random.default_rng(3))[0][:2], True)]
     tasks.append(ScreenTask((DEFAULT,), False))
     for task in tasks:
-        keep(task, tmp_path / f"{task.key}.json")
+        keep(kept_outcomes, task, tmp_path / f"{task.key}.json")
     kept = {file: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
     told: list[object] = []
     screening = screen(tasks, tmp_path, 1, told.append)
