@@ -45,6 +45,9 @@ COMMANDS = {
     "limit": Command(
         "rating.limit", "mpc,results", "computes how small the IAE of any policy can be, in classes"
     ),
+    "scorecard": Command(
+        "rating.scorecard", "mpc,results", "shows which controller survives which imperfection"
+    ),
     "train": Command("train", "results,rl", "trains a reinforcement learner, or exports one"),
     "compare-learners": Command(
         "compare_learners", "mpc,policies,results", "compares reinforcement learning with the MPCs"

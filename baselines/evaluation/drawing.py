@@ -170,17 +170,24 @@ def save_figure(figure: Figure, file: Path, kind: Format) -> None:
         figure.savefig(partial, format=kind, dpi=RESOLUTION, metadata=UNDATED.get(kind))
 
 
-def panels_below(titles: Sequence[str], heights: Sequence[float]) -> tuple[Figure, list[Axes]]:
+def panels_below(
+    titles: Sequence[str], heights: Sequence[float], columns: int = 1
+) -> tuple[Figure, list[Axes]]:
     """Panels below each other, in the style that all figures share.
 
     Args:
-        titles: of the panels.
-        heights: of the panels, in `PANEL_HEIGHT`.
+        titles: of the panels, row by row.
+        heights: of the rows, in `PANEL_HEIGHT`.
+        columns: panels beside each other; more than one fill a page instead of a column.
     """
     figure_type = require("matplotlib.figure", extra="results").Figure
-    size = (WIDTH, EDGE + PANEL_HEIGHT * sum(heights))
+    size = (min(columns, 2) * WIDTH, EDGE + PANEL_HEIGHT * sum(heights))
     figure = figure_type(figsize=size, layout="constrained", facecolor="white")
-    panels = figure.subplots(len(titles), 1, squeeze=False, height_ratios=heights)[:, 0].tolist()
+    grid = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
+    panels: list[Axes] = grid.ravel().tolist()
+    for spare in panels[len(titles) :]:
+        spare.remove()
+    del panels[len(titles) :]
     for place, (axes, title) in enumerate(zip(panels, titles, strict=True)):
         axes.spines[["top", "right"]].set_visible(False)
         axes.spines[["left", "bottom"]].set_color(INK)

@@ -22,6 +22,7 @@ from baselines.evaluation import foreign_code
 from baselines.evaluation.provenance import code_identity
 from baselines.mpc.settings import MpcSettings
 from baselines.registry import make_controller, settings_type
+from baselines.wrappers import innermost
 from crane_env import EPISODE_STEPS, CraneParameters, Person, Trajectory, practise, run_episode
 from crane_env.controller import Controller
 from crane_env.environment.options import start_of
@@ -275,7 +276,7 @@ def check_settings(specs: Iterable[EpisodeSpec]) -> None:
         # The cost is the reward's too.
         read = dataclasses.replace(setup.settings, cost=StageCost()) == MpcSettings()
         if not read and not any(
-            settings_type(name) is MpcSettings for name in names if "@" not in name
+            settings_type(name) is MpcSettings for name in names if "@" not in innermost(name)
         ):
             raise ValueError(
                 f"None of the controllers {', '.join(sorted(names))} takes settings of the optimal "
@@ -287,7 +288,7 @@ def check_settings(specs: Iterable[EpisodeSpec]) -> None:
 def _controller(name: str, believed: CraneParameters, settings: MpcSettings) -> Controller:
     takes: Any = settings_type(name)
     given: object = None
-    if "@" in name:  # a preset's settings are its own
+    if "@" in innermost(name):  # a preset's settings are its own
         pass
     elif takes is MpcSettings:
         given = settings

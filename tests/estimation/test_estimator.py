@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import math
 import pickle
-from collections import deque
 from typing import Any
 
 import gymnasium
@@ -21,39 +20,18 @@ from baselines.estimation.estimator import Estimated, Estimator
 from baselines.estimation.settings import EstimatorSettings
 from baselines.manual import Manual
 from baselines.mpc.settings import MpcSettings
-from crane_env.controller import Controller, reported_failures
+from crane_env.controller import reported_failures
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
 from tests.mpc.prediction.linear_crane import act, observe, random_observation
 
 CRANE = CraneParameters()
 PERIOD, GRAVITY = CRANE.control_period, CRANE.gravity
-NOISE = np.array([0.002, 0.005, 0.005, 0.005, math.radians(0.2), math.radians(0.5), 0.0, 0.0])
-"""Of a field crane's sensors, in the units of `Observation`."""
 
 
-class LateNoisySensors(gymnasium.ObservationWrapper[Any, Any, Any]):
-    """All readings by some periods late, with the noise of the field."""
-
-    def __init__(self, env: gymnasium.Env[Any, Any], late: int) -> None:
-        super().__init__(env)
-        self._held: deque[Any] = deque(maxlen=late + 1)
-
-    def reset(self, **arguments: Any) -> Any:
-        self._rng = np.random.default_rng(arguments["seed"])
-        self._held.clear()
-        return super().reset(**arguments)
-
-    def observation(self, observation: Any) -> Any:
-        self._held.append(observation)
-        seen = np.append(self._held[0][:6], observation[6:])
-        return seen + NOISE * self._rng.standard_normal(8)
-
-
-def mean_iae(controller: Controller, seeds: range, late: int | None = None) -> float:
-    env: Any = gymnasium.make("OILCrane-v0", operator="manoeuvre")
-    if late is not None:
-        env = LateNoisySensors(env, late)
+def mean_iae(name: str, seeds: range, imperfections: Any = None) -> float:
+    env: Any = gymnasium.make("OILCrane-v0", operator="manoeuvre", imperfections=imperfections)
+    controller = make_controller(name)
     played = [crane_env.run_episode(env, controller, seed=s).metrics().IAE for s in seeds]
     return float(np.mean(played))
 
@@ -65,17 +43,30 @@ def own(crane: CraneParameters) -> Manual:
 @pytest.mark.slow
 def test_with_field_noise_and_60_ms_of_delay_adaptive_keeps_its_error_within_a_tenth() -> None:
     seeds = range(50)
-    late = {"sway_delay": 0.06, "drive_delay": 0.06}
-    plain = mean_iae(make_controller("adaptive"), seeds)
-    behind = Estimated(CRANE, make_controller("adaptive"), late)
-    assert mean_iae(behind, seeds, late=3) == pytest.approx(plain, rel=0.1)
+    late = mean_iae("estimated@field:adaptive", seeds, "noise-and-delay")
+    assert late == pytest.approx(mean_iae("adaptive", seeds), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "number", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 6, 9))]
+)
+def test_in_steady_wind_the_payload_stops_as_soon_as_without(number: int) -> None:
+    """A manoeuvre of Table I under 50 N on 100 kg."""
+
+    def drift(name: str, imperfections: Any) -> float:
+        env = gymnasium.make(
+            "OILCrane-v0", operator=f"table1:{number}", imperfections=imperfections
+        )
+        return crane_env.run_episode(env, make_controller(name), seed=0).metrics().release_drift
+
+    still, wind = drift("adaptive", None), drift("adaptive", "steady-force")
+    estimated = drift("estimated:adaptive", "steady-force")
+    assert estimated < min(2.0, still + 0.3) < still + 1.0 < wind
 
 
 def test_without_noise_and_delay_the_estimator_costs_nothing() -> None:
-    plain = mean_iae(make_controller("adaptive"), range(3))
-    assert mean_iae(make_controller("estimated:adaptive"), range(3)) == pytest.approx(
-        plain, rel=0.01
-    )
+    plain = mean_iae("adaptive", range(3))
+    assert mean_iae("estimated:adaptive", range(3)) == pytest.approx(plain, rel=0.01)
 
 
 @pytest.mark.parametrize(("sway_delay", "drive_delay"), [(0.0, 0.0), (0.06, 0.0), (0.08, 0.04)])

@@ -470,7 +470,7 @@ def test_the_cost_of_a_setup_is_that_of_every_controller_which_minimises_one() -
     weights = StageCost(sway_weight=0.3, acceleration_weight=0.01)
     setup = dataclasses.replace(SHORT, settings=MpcSettings(cost=weights))
     seen = np.array([0.0, 0.5, 5.0, 0.0, 0.02, 0.0, 1.0, 0.0])
-    for name in ("lqr", "adaptive"):
+    for name in ("lqr", "adaptive", "estimated@field:adaptive", "delayed@1ms:lqr"):
         (spec,) = episode_specs([name], ["table1:1"], [0], setup)
         expected = make_controller(name, settings={"cost": weights}).act(seen)
         assert build_controller(spec).act(seen) == expected != make_controller(name).act(seen)

@@ -1,0 +1,1 @@
+"""Scorecard: which controller survives which imperfection, and how severe a one."""
