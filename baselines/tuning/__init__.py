@@ -1,0 +1,1 @@
+"""Tuning: settings of the controllers, searched with the same budget for each."""
