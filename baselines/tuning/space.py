@@ -50,6 +50,11 @@ def _cost_and_integral(numbers: Mapping[str, float]) -> dict[str, Any]:
     return {**_cost(numbers), "integral_weight": numbers["integral_weight"]}
 
 
+def _course(numbers: Mapping[str, float]) -> dict[str, Any]:
+    course = {name: numbers[name] for name in ("effort_weight", "sway_limit")}
+    return {**course, "feedback": _cost_and_integral(numbers)}
+
+
 def _windows(numbers: Mapping[str, float]) -> dict[str, Any]:
     longest = numbers["window"]
     shorter = longest * numbers["shorter"]
@@ -72,6 +77,15 @@ SPACES: dict[str, Space] = {
     "flat": Space(
         {**WEIGHTS, "window": Range(0.6, 4.0), "shorter": Range(0.1, 1.0)},
         _windows,
+    ),
+    "recommended": Space(
+        {
+            **WEIGHTS,
+            "integral_weight": Range(1e-3, 1.0),
+            "effort_weight": Range(1e-4, 1.0),
+            "sway_limit": Range(0.03, 0.12),
+        },
+        _course,
     ),
     "l1": Space(
         {
