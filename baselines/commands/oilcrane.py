@@ -48,7 +48,9 @@ COMMANDS = {
     "scorecard": Command(
         "rating.scorecard", "mpc,results", "shows which controller survives which imperfection"
     ),
-    "tune": Command("rating.tune", "mpc,results,tune", "tunes every controller with the same budget"),
+    "tune": Command(
+        "rating.tune", "mpc,results,tune", "tunes every controller with the same budget"
+    ),
     "train": Command("train", "results,rl", "trains a reinforcement learner, or exports one"),
     "compare-learners": Command(
         "compare_learners", "mpc,policies,results", "compares reinforcement learning with the MPCs"

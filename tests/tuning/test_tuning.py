@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from baselines import make_controller, presets
-#from baselines.commands import tune
+from baselines.commands.rating import tune
 from baselines.tuning import search as searching
 from baselines.tuning.report import markdown_report, preset_data
 from baselines.tuning.search import CLASSES, SearchTask, Trial, best, search
