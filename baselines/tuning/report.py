@@ -84,8 +84,8 @@ def markdown_report(
         name: sum(trial.score is None for trial in trials) for name, trials in searches.items()
     }
     told = ", ".join(f"`{name}` {count}" for name, count in failed.items() if count) or "none"
-    head = ("controller", "preset", "IAE [m]", "drift [m]", "sway [deg]", "effort [m/s²]")
-    head += ("inching error", f"IAE and drift to `{REFERENCE}`'s", "settings")
+    indices = ("IAE [m]", "drift [m]", "sway [deg]", "effort [m/s²]", "inching error")
+    head = ("controller", "preset", *indices, f"IAE and drift to `{REFERENCE}`'s", "settings")
     introduction = INTRODUCTION.format(
         trials=max(map(len, searches.values())), count=len(seeds), first=seeds[0], last=seeds[-1]
     )
