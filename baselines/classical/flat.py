@@ -31,7 +31,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.classical.lqr import GainSchedule, regulator
+from baselines.classical.lqr import ScheduledGains, regulator
 from baselines.controller import finite_observation
 from baselines.mpc.limits import TrolleyLimits
 from baselines.mpc.prediction.cable import assumed_length
@@ -91,7 +91,7 @@ class FlatSettings:
         )
 
 
-class Plan(NamedTuple):
+class PayloadPlan(NamedTuple):
     """The payload's planned velocity and its derivatives at the end of a control period.
 
     Attributes:
@@ -122,11 +122,11 @@ class Planner:
         """Forgets the reference: it was 0 before it began."""
         self._past = np.zeros(self._kernels.shape[1])
 
-    def next(self, reference: float) -> Plan:
+    def next(self, reference: float) -> PayloadPlan:
         """The plan with one more sample of the reference [m/s]."""
         self._past[1:] = self._past[:-1]
         self._past[0] = reference
-        return Plan(*np.dot(self._kernels, self._past).tolist())
+        return PayloadPlan(*np.dot(self._kernels, self._past).tolist())
 
 
 def windows_step_response(windows: tuple[float, ...], period: float) -> NDArray[np.float64]:
@@ -158,7 +158,7 @@ class Flat(Controller):
         self._gravity, self._period = crane.gravity, crane.control_period
         self._length_min = crane.cable_length_min
         self._planner = Planner(windows_step_response(settings.windows, self._period))
-        self._feedback = GainSchedule(
+        self._feedback = ScheduledGains(
             crane, lambda length: regulator(crane, settings.feedback, length).gain
         )
         self._limits = TrolleyLimits(crane, MpcSettings())

@@ -153,7 +153,7 @@ def riccati(
 
 
 @final
-class GainSchedule:
+class ScheduledGains:
     """Gains of a regulator, interpolated at the measured length.
 
     Args:
@@ -210,7 +210,7 @@ class Lqr(Controller):
     """
 
     def __init__(self, crane: CraneParameters, settings: LqrSettings) -> None:
-        self._schedule = GainSchedule(
+        self._schedule = ScheduledGains(
             crane, lambda length: regulator(crane, settings.cost, length).gain
         )
         self._limits = TrolleyLimits(crane, MpcSettings())

@@ -27,7 +27,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.classical.lqr import GainSchedule, LqrSettings, Regulator, model, riccati
+from baselines.classical.lqr import LqrSettings, Regulator, ScheduledGains, model, riccati
 from baselines.controller import finite_observation
 from baselines.mpc.limits import TrolleyLimits
 from baselines.mpc.settings import MpcSettings
@@ -110,7 +110,7 @@ class LqrIntegral(Controller):
 
     def __init__(self, crane: CraneParameters, settings: LqrIntegralSettings) -> None:
         self._period = crane.control_period
-        self._schedule = GainSchedule(
+        self._schedule = ScheduledGains(
             crane, lambda length: integral_regulator(crane, settings, length).gain
         )
         self._limits = TrolleyLimits(crane, MpcSettings())

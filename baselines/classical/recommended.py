@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.classical.flat import Planner
-from baselines.classical.lqr import GainSchedule
+from baselines.classical.lqr import ScheduledGains
 from baselines.classical.lqr_integral import LqrIntegralSettings, integral_regulator
 from baselines.controller import finite_observation
 from baselines.mpc.limits import TrolleyLimits
@@ -182,7 +182,7 @@ class Recommended(Controller):
         self._length_min = crane.cable_length_min
         self._learned = self._period / settings.lean_time
         self._planner = Planner(course(crane, settings))
-        self._feedback = GainSchedule(
+        self._feedback = ScheduledGains(
             crane, lambda length: integral_regulator(crane, settings.feedback, length).gain
         )
         self._limits = TrolleyLimits(crane, MpcSettings())

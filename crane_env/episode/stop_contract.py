@@ -59,7 +59,7 @@ WAIT = 15.0
 """Played after the release [s]."""
 
 
-class Stop(NamedTuple):
+class PressOutcome(NamedTuple):
     """One press and what became of it.
 
     Attributes:
@@ -106,10 +106,10 @@ class StopContract:
     settling_time: float
     inching_settling_time: float
     failures: int
-    stops: tuple[Stop, ...]
+    stops: tuple[PressOutcome, ...]
 
     @classmethod
-    def of(cls, stops: tuple[Stop, ...], failures: int = 0) -> StopContract:
+    def of(cls, stops: tuple[PressOutcome, ...], failures: int = 0) -> StopContract:
         """The indices of presses."""
         travelled = [one for one in stops if one.hold >= TRAVEL]
         inched = [one for one in stops if one.hold == INCHING]
@@ -183,14 +183,14 @@ def stop_contract(
     return StopContract.of(tuple(stops), failures)
 
 
-def _stop(played: Trajectory, hold: float, length: float, hoist: str | None) -> Stop:
+def _stop(played: Trajectory, hold: float, length: float, hoist: str | None) -> PressOutcome:
     period, position = played.parameters.control_period, played.payload_position
     release = release_step(played.travel_reference)
     assert release is not None, "a press has a release"
     turn = played.parameters.sway_period(float(played.cable_length[-1]))
     rest = float(position[-round(turn / period) :].mean())
     unsettled = np.flatnonzero(np.abs(position[release:] - rest) > SETTLING_BAND)
-    return Stop(
+    return PressOutcome(
         hold=hold,
         cable_length=length,
         hoist=hoist,

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from baselines import make_controller
-from crane_env.episode.stop_contract import Stop, StopContract, stop_contract
+from crane_env.episode.stop_contract import PressOutcome, StopContract, stop_contract
 
 
 def test_the_indices_of_presses_by_hand() -> None:
     stops = (
-        Stop(0.2, 4.0, None, 0.2, 0.1, 0.1, 1.0),
-        Stop(0.2, 8.0, None, 0.2, 0.24, 0.24, 3.0),
-        Stop(4.0, 4.0, None, 4.0, 3.9, 1.0, 2.0),
-        Stop(4.0, 8.0, "up", 4.0, 4.3, 1.4, 6.0),
+        PressOutcome(0.2, 4.0, None, 0.2, 0.1, 0.1, 1.0),
+        PressOutcome(0.2, 8.0, None, 0.2, 0.24, 0.24, 3.0),
+        PressOutcome(4.0, 4.0, None, 4.0, 3.9, 1.0, 2.0),
+        PressOutcome(4.0, 8.0, "up", 4.0, 4.3, 1.4, 6.0),
     )
     found = StopContract.of(stops)
     assert found.displacement_error == pytest.approx(0.3)

@@ -476,6 +476,24 @@ def test_the_cost_of_a_setup_is_that_of_every_controller_which_minimises_one() -
         assert build_controller(spec).act(seen) == expected != make_controller(name).act(seen)
 
 
+def test_settings_of_a_setup_are_for_controllers_without_a_preset_of_their_own() -> None:
+    cost = StageCost(acceleration_weight=2.0)
+    setup, seen = Setup(settings=MpcSettings(cost=cost)), np.array([0, 0.2, 5, 0, 0.1, 0, 1, 0.0])
+
+    def answer(name: str) -> float:
+        (spec,) = episode_specs([name], ["table1:1"], [0], setup)
+        return float(build_controller(spec).act(seen)[0])
+
+    given = make_controller("lqr", settings={"cost": cost}).act(seen)[0]
+    assert answer("lqr@light") == make_controller("lqr@light").act(seen)[0] != given
+    assert answer("lqr") == given
+    (spec,) = episode_specs(
+        ["l1@sway"], ["table1:1"], [0], Setup(settings=MpcSettings(tail="zero"))
+    )
+    with pytest.raises(ValueError, match="None of the controllers l1@sway takes settings"):
+        check_controllers([spec])
+
+
 def test_nonsense_is_refused_with_what_is_allowed() -> None:
     with pytest.raises(ValueError, match="jobs must be a whole number of at least 1, not 0"):
         compare(specs_of("manual"), ResultsFolder(Path("unused")), jobs=0)
