@@ -76,7 +76,11 @@ def readable(name: str) -> str | None:
     files = _files(name)
     if files is None or sum(map(os.path.getsize, files)) > MOST_BYTES:
         return None
-    libraries = sorted(f"{one.name} {one.version}" for one in importlib.metadata.distributions())
+    inside = tuple(os.path.join(folder, "") for folder in LIBRARIES)  # noqa: PTH118
+    # What a library carries in its own folder counts by the library's version.
+    paths = [path for path in sys.path if path in LIBRARIES or not path.startswith(inside)]
+    found = importlib.metadata.distributions(path=paths)
+    libraries = sorted(f"{one.name} {one.version}" for one in found)
     return hashlib.sha256("\0".join((_digest(files), *libraries)).encode()).hexdigest()
 
 
