@@ -335,7 +335,7 @@ def benchmark_evaluate(rounds: int) -> list[Timing]:
         FailedError: an episode failed, as all do when the code is edited meanwhile.
     """
     many = episode_specs(["adaptive"], ["random"], range(15 * rounds + STEADY), Setup())
-    specs = many[: 2 * rounds + STEADY]
+    specs = many[: 2 * rounds + STEADY + 2]
     env, controller = gymnasium.make("OILCrane-v0"), make_controller("adaptive")
     with tempfile.TemporaryDirectory() as name:
         folder = ResultsFolder(Path(name))
