@@ -71,7 +71,13 @@ def limit_report(findings: LimitFindings) -> str:
     parts = [intro, limit_table(findings), "## How far the model carries", MODEL]
     if len(findings.previews):
         picture = f"![IAE over preview and delay of the buttons]({FIGURE}.png)"
-        parts += ["## The price of intent", INTENT, picture, intent_table(findings)]
+        priced = max(sum(bool(v.intent) for v in found) for found in findings.values.values())
+        parts += [
+            "## The price of intent",
+            INTENT.format(count=priced),
+            picture,
+            intent_table(findings),
+        ]
     facts = ", ".join(f"{key} {value}" for key, value in machine().items())
     versions = ", ".join(f"{key} {value}" for key, value in package_versions().items())
     parts += ["## Made with", f"{findings.unsolved} programs unsolved; {facts}; {versions}."]
@@ -125,9 +131,10 @@ operator `{operator}`, on the crane linearised at theta = 0 with a known, rigid 
 MODEL = """The programs are exact for accelerations that are held over a control period of 20 ms;
 with 10 ms the values change by less than 0.4 %. The rest is the model: sin(theta) = theta makes the
 payload's acceleration too large by 2/3 theta², 0.5 % at 5 degrees of sway and 1.8 % at 9, which is
-what the plans of 5 m/s² with free sway use. With sway limited, or with less acceleration, the crane
-follows the clairvoyant plan within 1 %; those of 5 m/s² with free sway it misses by about 0.03 m,
-so that their value bounds the linear crane and the real one does not quite reach it.
+what the plans of 5 m/s² with free sway use. With the sway limited, or with 1 m/s² or less, the
+crane follows the clairvoyant plan within 1 %; with free sway it misses that of 2 m/s² by 2 %, that
+of 5 m/s² by 7 % (0.03 m), so that these bound the linear crane and the real one does not quite
+reach them.
 
 The gambler (`make_controller("gambler")`) acts on the family's statistics as if the buttons were
 pressed and released before they are, and on forward manoeuvres goes below the settled-class value.
@@ -136,4 +143,5 @@ states at the presses and releases were worth at most, and what IAE this run cou
 On the operator `memoryless` no such bet pays."""
 
 INTENT = """Mean IAE [m] of replanning with the buttons known ahead (+) or late (-), and in brackets
-what that changes. A touch-sensing pendant would buy the preview, a radio link costs the delay."""
+what that changes; manoeuvres: {count}. A touch-sensing pendant would buy the preview, a radio link
+costs the delay."""
