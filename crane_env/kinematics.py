@@ -5,6 +5,8 @@ All functions take floats or arrays of equal shape, in SI units, and return the 
 
 from __future__ import annotations
 
+import math
+
 from crane_env.support.arithmetic import Scalars, cosine, sine
 
 
@@ -32,4 +34,24 @@ def payload_velocity(
         trolley_velocity
         + cable_length * sway_rate * cosine(sway_angle)
         + cable_rate * sine(sway_angle)
+    )
+
+
+def about_sheave(
+    ahead: float, depth: float, across: float, down: float
+) -> tuple[float, float, float, float]:
+    """Angle [rad], distance [m] and their rates of a point that hangs and moves about the sheave.
+
+    Args:
+        ahead: along the girder, from the sheave [m].
+        depth: below the girder [m].
+        across: velocity along the girder, from the sheave's [m/s].
+        down: velocity downwards [m/s].
+    """
+    reach = math.hypot(ahead, depth)
+    return (
+        math.atan2(ahead, depth),
+        reach,
+        (across * depth - ahead * down) / reach**2,
+        (ahead * across + depth * down) / reach,
     )

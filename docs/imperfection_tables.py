@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from crane_env.imperfections.base import Imperfection
-from crane_env.imperfections.registry import PARTS, SCENARIOS
+from crane_env.imperfections.registry import OUT_OF_FIELD, PARTS, SCENARIOS
 
 
 def write(folder: Path) -> None:
@@ -15,7 +15,9 @@ def write(folder: Path) -> None:
     kinds = {name: type(part)() for name, part in PARTS.items()}
     scenarios = ["| name | what differs from the plain crane |", "|---|---|"]
     for name, parts in SCENARIOS.items():
-        changed = "all but `steady-force`" if name == "field" else ", ".join(map(_changed, parts))
+        changed = ", ".join(map(_changed, parts))
+        if name == "field":
+            changed = "all but " + ", ".join(f"`{part}`" for part in OUT_OF_FIELD)
         scenarios.append(f"| `{name}` | {changed} |")
     rows = ["| part | field | unit | default | source |", "|---|---|---|---|---|"]
     for name, part in kinds.items():

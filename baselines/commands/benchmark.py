@@ -49,7 +49,7 @@ from baselines.mpc.linear import LinearMpc
 from baselines.mpc.prediction.cable import measured_cable_rate
 from baselines.mpc.settings import MpcSettings
 from crane_env.controller import Controller
-from crane_env.plant.single import build_model
+from crane_env.plant.model import build_model
 from crane_env.plant.start import AT_REST
 from crane_env.support.checks import choice, whole
 

@@ -16,6 +16,7 @@ from crane_env.environment.pictures import Pictures
 from crane_env.environment.report import StepRecord, report_period, report_start
 from crane_env.imperfections.base import EVERYONE, Episode, Imperfection, Moment
 from crane_env.imperfections.path import SignalPath, check_imperfections
+from crane_env.imperfections.payload import rigging_of
 from crane_env.imperfections.registry import ImperfectionSpec, make_imperfections
 from crane_env.observation import CraneState, Observation, observation_space
 from crane_env.operators.base import EVENT_TOLERANCE, RELEASED, Buttons, Operator, due_time
@@ -179,7 +180,6 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         self._render_mode = render_mode
         self._parameters = CraneParameters.of(parameters)
         self._cost = StageCost.of(cost)
-        self._plant = Plant(self._parameters)
         frames = max(1, round(1.0 / self._parameters.control_period))
         self.metadata = {**self.metadata, "render_fps": frames}
         limit = self._parameters.acceleration_max
@@ -194,6 +194,7 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         self._judge: TaskJudge | None = None
         self._default_imperfections = make_imperfections(imperfections)
         check_imperfections(self._default_imperfections, self._parameters)
+        self._plant = Plant(self._parameters, rigging_of(self._default_imperfections))
         self._path: SignalPath | None = None
         self._step_index = 0
         self._due = -math.inf
@@ -277,6 +278,10 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
             mass = path.payload_masses(np.zeros(1)).item()
             obstacles += path.obstacles(0)
         self._path = path
+        rigging = rigging_of(imperfections)
+        if rigging != self._plant.rigging:
+            self._plant = Plant(parameters, rigging)
+            self._pictures.close()
         self._plant.carry(mass)
         self._plant.reset(start, obstacles)
         state, tension = self._plant.measure()
@@ -400,7 +405,10 @@ class OILCraneEnv(gymnasium.Env[NDArray[np.float64], NDArray[Any]]):
         observation = np.array((*state, *self._references))
         if self._path is not None:
             info["truth"] = observation
-            observation = self._path.measure(EVERYONE, observation[None])[0]
+            seen = observation
+            if self._plant.rigging is not None:
+                seen = np.array((*self._plant.cable(), *self._references))
+            observation = self._path.measure(EVERYONE, seen[None])[0]
             info["measurement"] = observation.copy()
         if self._render_mode == "human":
             self.render()

@@ -33,6 +33,7 @@ from crane_env.environment.report import (
 )
 from crane_env.imperfections.base import EVERYONE, Episode, Imperfection, Moment, Which
 from crane_env.imperfections.path import SignalPath, check_imperfections
+from crane_env.imperfections.payload import rigging_of
 from crane_env.imperfections.registry import (
     VectorImperfectionSpec,
     make_all_imperfections,
@@ -173,7 +174,10 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             for corner in self._randomisation.check(crane)
         ]
         self._parameters = self._own_parameters[0]
-        self._plant = VectorPlant(self._own_parameters, threads=threads)
+        self._default_imperfections = make_all_imperfections(imperfections, self.num_envs)
+        rigging = rigging_of(self._default_imperfections[0])
+        self._plant = VectorPlant(self._own_parameters, threads=threads, rigging=rigging)
+        self._check_imperfections(self._default_imperfections)
         self._default_operators = make_operators(operator, self.num_envs)
         everyone = np.ones(self.num_envs, dtype=np.bool_)
         starts = starts_of_each({}, everyone, self._default_operators, self._own_parameters)
@@ -183,8 +187,6 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             self._default_tasks, self._own_parameters, self._randomisation, dict(enumerate(starts))
         )
         self._judge = VectorJudge(self.num_envs)
-        self._default_imperfections = make_all_imperfections(imperfections, self.num_envs)
-        self._check_severities(self._default_imperfections)
         self._path: SignalPath | None = None
         self._references = self._operator.references
         self._measured: NDArray[np.float64] | None = None
@@ -277,7 +279,7 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
         imperfections = self._default_imperfections
         if "imperfections" in placed:
             imperfections = make_all_imperfections(placed.pop("imperfections"), self.num_envs)
-            self._check_severities(imperfections)
+            self._check_imperfections(imperfections)
         for index in np.flatnonzero(chosen).tolist():
             check_has_task(operators[index], tasks[index])
         starts = starts_of_each(placed, chosen, operators, self._own_parameters)
@@ -518,7 +520,8 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             return truth
         if self._measured is None:
             self._measured = truth.copy()
-        self._measured[which] = self._path.measure(which, truth[which])
+        seen = truth if self._plant.rigging is None else self._truth(self._plant.cable())
+        self._measured[which] = self._path.measure(which, seen[which])
         return self._measured.copy()
 
     def _truth(self, state: CraneState) -> NDArray[np.float64]:
@@ -542,8 +545,15 @@ class OILCraneVectorEnv(VectorEnv[NDArray[np.float64], NDArray[Any], NDArray[Any
             own = {name: values.copy() for name, values in info.items()}
             self.recorder(StepRecord(self.times, truth, own, asked, rewards.copy()))
 
-    def _check_severities(self, imperfections: Sequence[tuple[Imperfection, ...]]) -> None:
+    def _check_imperfections(self, imperfections: Sequence[tuple[Imperfection, ...]]) -> None:
         worst = (self._randomisation.severity or (1.0, 1.0))[1]
+        riggings = {rigging_of(parts) for parts in set(imperfections)}
+        randomised = self._plant.rigging is not None and self._randomisation.severity is not None
+        if riggings != {self._plant.rigging} or randomised:
+            raise ValueError(
+                "A double pendulum is another plant: all cranes of a vector environment have the "
+                "same from the beginning, or none, and its severity is not randomised."
+            )
         for parts, crane in set(zip(imperfections, self._own_parameters, strict=True)):
             for corner in self._randomisation.check(crane):
                 check_imperfections(scaled(parts, worst), corner)

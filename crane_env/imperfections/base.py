@@ -62,12 +62,14 @@ class Episode(NamedTuple):
     Attributes:
         number: which seeds all that is drawn in it.
         parameters: of the crane.
-        start: where it begins.
+        start: where it begins, by its cable.
+        slings: how far the payload hangs below the hook [m].
     """
 
     number: int
     parameters: CraneParameters
     start: CraneState
+    slings: float = 0.0
 
     def generator(self, name: str) -> np.random.Generator:
         """The generator of the imperfection of this name."""

@@ -23,6 +23,7 @@ from crane_env.imperfections.base import (
     PayloadPart,
     Which,
 )
+from crane_env.imperfections.payload import rigging_of
 from crane_env.imperfections.registry import PARTS
 from crane_env.observation import CraneState, largest_state
 from crane_env.parameters import CraneParameters
@@ -79,6 +80,9 @@ class SignalPath:
         for crane, parts, episode in zip(cranes, given, episodes, strict=True):
             self.imperfections[crane] = tuple(parts)
             self._suit(crane, episode.parameters)
+            rigging = rigging_of(parts)
+            if rigging is not None:
+                episode = episode._replace(slings=rigging.offset)
             active = {part.name: part for part in parts if part.severity > 0.0}
             for name in active.keys() - self._parts.keys():
                 self._parts[name] = active[name].part(count)

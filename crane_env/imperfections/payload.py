@@ -1,8 +1,9 @@
-"""Payload: of another mass than on paper, changed at a pick-up, and set down on the ground."""
+"""Payload: of another mass, changed at a pick-up, set down on the ground, long, or on slings."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,10 +14,12 @@ from crane_env.imperfections.base import (
     Episode,
     Imperfection,
     ObstaclePart,
+    Part,
     PayloadPart,
     quantity,
 )
 from crane_env.operators.base import EVENT_TOLERANCE
+from crane_env.plant.rigging import Rigging
 from crane_env.tasks.task import FARTHEST, Obstacle, place_of
 
 CLEARANCE = 0.05
@@ -76,7 +79,7 @@ class _Ground(ObstaclePart):
 
     def begin(self, crane: int, spec: Ground, episode: Episode) -> None:
         depth = episode.parameters.cable_length_max - spec.severity * spec.height
-        depth = max(depth, place_of(episode.start).depth + CLEARANCE)
+        depth = max(depth, place_of(episode.start).depth + episode.slings + CLEARANCE)
         self._obstacles[crane] = (Obstacle(left=-FARTHEST, right=FARTHEST, top=depth),)
 
     def obstacles(self, crane: int) -> tuple[Obstacle, ...]:
@@ -98,3 +101,48 @@ class Ground(Imperfection):
     part: ClassVar = _Ground
     name: str = dataclasses.field(default="ground", init=False)
     height: float = quantity(0.5, "m", "a hook that reaches the floor; assumed", 0.0, 1e5)
+
+
+class _Slings(Part):
+    """Remembers nothing: the plant is another one."""
+
+    def __init__(self, count: int) -> None: ...
+
+    def begin(self, crane: int, spec: DoublePendulum, episode: Episode) -> None:
+        spec.rigging.check(episode.parameters)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoublePendulum(Imperfection):
+    """The payload swings on slings below the hook, see `crane_env.plant.rigging`.
+
+    The truth, and so metrics and task, is the payload's: cable length and sway of the straight line
+    from the sheave to its centre. Sensors see length and sway of the cable. The hook takes the
+    place of the payload at the start. The severity multiplies the offset.
+
+    Attributes:
+        hook_mass: of the payload mass [kg].
+        offset: from the hook to the payload's centre [m].
+        gyration_radius: of the payload about its centre; of a long one 0.29 times its length [m].
+    """
+
+    part: ClassVar = _Slings
+    name: str = dataclasses.field(default="double-pendulum", init=False)
+    hook_mass: float = quantity(10.0, "kg", "hook block of a 1 t hoist; assumed", 1e-3, 1e6)
+    offset: float = quantity(1.0, "m", "slings of 1.3 m at 45 degrees", 1e-3, 100.0)
+    gyration_radius: float = quantity(0.4, "m", "a box of 1.1 x 0.9 m", 1e-3, 100.0)
+
+    @property
+    def rigging(self) -> Rigging:
+        """Of the plant."""
+        return Rigging(
+            hook_mass=self.hook_mass,
+            offset=self.severity * self.offset,
+            gyration_radius=self.gyration_radius,
+        )
+
+
+def rigging_of(parts: Iterable[Imperfection]) -> Rigging | None:
+    """What the plant needs below the hook; None: nothing."""
+    slings = (part for part in parts if isinstance(part, DoublePendulum) and part.severity > 0.0)
+    return next((part.rigging for part in slings), None)

@@ -17,7 +17,7 @@ from crane_env.imperfections.drive import (
 )
 from crane_env.imperfections.force import Bumps, SteadyForce
 from crane_env.imperfections.operation import EmergencyStop, PendantLatency
-from crane_env.imperfections.payload import Ground, PayloadMass
+from crane_env.imperfections.payload import DoublePendulum, Ground, PayloadMass
 from crane_env.imperfections.sensing import (
     CableLengthError,
     SensorBias,
@@ -42,6 +42,7 @@ PARTS: dict[str, Imperfection] = {
         WornBrake(),
         HoistSag(),
         PayloadMass(),
+        DoublePendulum(),
         Wind(),
         SteadyForce(),
         Bumps(),
@@ -56,8 +57,12 @@ PARTS: dict[str, Imperfection] = {
 }
 """Each imperfection as in the field, in the order in which signals meet them."""
 
+OUT_OF_FIELD = ("steady-force", "double-pendulum")
+"""A steady force, for the field has wind; and slings, which make another plant of the crane: in a
+vector environment all cranes have them, equally severe, or none."""
+
 SCENARIOS: dict[str, tuple[Imperfection, ...]] = {
-    "field": tuple(part for name, part in PARTS.items() if name != "steady-force"),
+    "field": tuple(part for name, part in PARTS.items() if name not in OUT_OF_FIELD),
     "noise": (SensorNoise(), SensorBias(), SensorQuantisation()),
     "delay": (SensorDelay(),),
     "noise-and-delay": (SensorDelay(), SensorNoise()),
@@ -67,12 +72,13 @@ SCENARIOS: dict[str, tuple[Imperfection, ...]] = {
     "worn-drive": (AccelerationQuantisation(), Backlash(), WornBrake(), HoistSag()),
     "late-buttons": (PendantLatency(latency=0.3),),
     "stops": (EmergencyStop(mean_interval=10.0, reset_time=2.0),),
+    "long-payload": (DoublePendulum(offset=1.5, gyration_radius=1.2),),
     "gust": (Wind(mean_speed=0.0, gust_speed=10.0),),
     "air-drag": (Wind(mean_speed=0.0),),
     "pick-up": (PayloadMass(gain=0.0, pick_up=0.5),),
     "release": (PayloadMass(gain=0.0, pick_up=-0.3),),
 }
-"""Named sets of imperfections; "field" is all but a steady force, for which it has wind."""
+"""Named sets of imperfections; "field" is all but `OUT_OF_FIELD`."""
 
 ImperfectionSpec = str | Mapping[str, Any] | Imperfection | Sequence[Any] | None
 """What `make_imperfections` makes imperfections of."""

@@ -18,24 +18,29 @@ from numpy.typing import NDArray
 from crane_env.kinematics import payload_position
 from crane_env.observation import CraneState, is_sound, largest_state
 from crane_env.parameters import CraneParameters
-from crane_env.plant.contact import Outline, stop
+from crane_env.plant.contact import Outline, Stopped, stop
 from crane_env.plant.drives import Drives, Stroke
-from crane_env.plant.outcome import Outcome
-from crane_env.plant.single import (
+from crane_env.plant.model import (
     DRIVE_ERROR,
     DRUM,
     REACH,
     SETPOINT,
     SWAY,
-    Plant,
     build_model,
     cable_gains,
     cable_pull,
     drive_loops,
     drum_stroke,
+    hang,
+    hook_of,
+    joint_positions,
 )
+from crane_env.plant.outcome import Outcome
+from crane_env.plant.rigging import Rigging
+from crane_env.plant.single import Plant
 from crane_env.plant.start import AT_REST, Start
 from crane_env.support.checks import whole
+from crane_env.support.fixed import fixed
 from crane_env.tasks.task import Obstacle
 
 VARIABLE = ("payload_mass", "cable_stiffness", "cable_length_initial", "drive_bandwidth")
@@ -54,19 +59,30 @@ class VectorPlant:
     Args:
         cranes: parameters of each crane, alike but for `VARIABLE`.
         threads: that step the cranes; 0: one for each processor.
+        rigging: below the hooks of all cranes, see `Plant`.
 
     Raises:
-        ValueError: no crane, cranes that differ in more than `VARIABLE`, or a negative number of
-            threads.
+        ValueError: no crane, cranes that differ in more than `VARIABLE`, a negative number of
+            threads, or a rigging with which a crane cannot be simulated.
     """
 
-    def __init__(self, cranes: Sequence[CraneParameters], *, threads: int = 0) -> None:
+    def __init__(
+        self,
+        cranes: Sequence[CraneParameters],
+        *,
+        threads: int = 0,
+        rigging: Rigging | None = None,
+    ) -> None:
         if not cranes:
             raise ValueError("A vector plant needs at least one crane.")
         self.threads = whole("threads", threads, 0, MAX_THREADS + 1)
         self.cranes = [cranes[0]] * len(cranes)
-        model = build_model(cranes[0])
-        self._trolley, self._payload = model.body("trolley").id, model.body("payload").id
+        self._rigging = rigging
+        model = build_model(cranes[0], rigging)
+        self._trolley, self._hook = model.body("trolley").id, hook_of(model)
+        self._payload = self._hook + (rigging is not None)
+        self._below = slice(SWAY, model.nq - 1)
+        self._model = model
         self._batch = Batch(model, len(cranes), self.threads)
         self._position: NDArray[np.float64] = self._batch.bind("qpos")
         self._velocity: NDArray[np.float64] = self._batch.bind("qvel")
@@ -103,6 +119,7 @@ class VectorPlant:
         return {
             "cranes": self.cranes,
             "threads": self.threads,
+            "rigging": self._rigging,
             "obstacles": self._obstacles,
             "state": self._batch.state.copy(),
             "gains": self._cable_gains.copy(),
@@ -110,7 +127,9 @@ class VectorPlant:
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         """Rebuilds the batch and restores the states."""
-        self.__init__(saved["cranes"], threads=saved["threads"])  # type: ignore[misc]
+        self.__init__(  # type: ignore[misc]
+            saved["cranes"], threads=saved["threads"], rigging=saved["rigging"]
+        )
         everyone = np.arange(len(self))
         self.reset(everyone, [AT_REST] * len(self), saved["obstacles"])
         self._batch.state[:] = saved["state"]
@@ -128,13 +147,19 @@ class VectorPlant:
         """
         for crane in cranes:
             check_alike(crane, self.cranes[0])
+            if self._rigging is not None:
+                self._rigging.check(crane)
         heavier = []
         for index, crane in zip(indices.tolist(), cranes, strict=True):
             present = self.cranes[index]
             if crane is present:
                 continue
             if crane.payload_mass != present.payload_mass:
-                self._batch.expand("body_mass")[index, self._payload] = crane.payload_mass
+                mass = self._batch.expand("body_mass")[index]
+                inertia = self._model.body_inertia
+                if self._rigging is not None:
+                    inertia = self._batch.expand("body_inertia")[index]
+                hang(mass, inertia, self._hook, crane.payload_mass, self._rigging)
                 heavier.append(index)
             if crane.drive_bandwidth != present.drive_bandwidth:
                 position_loop, velocity_loop = drive_loops(crane)
@@ -175,8 +200,9 @@ class VectorPlant:
                 self._obstructed += bool(walls) - bool(self._obstacles[index])
                 self._obstacles[index] = tuple(walls)
                 self._outlines[index] = Outline.of(walls, self.cranes[index])
-        position = np.array([place.position for place in places])
-        velocity = np.array([place.velocity for place in places])
+        joints = [joint_positions(place, self._rigging) for place in places]
+        position = np.array([place for place, _ in joints])
+        velocity = np.array([rates for _, rates in joints])
         self._put(indices, position, velocity, position[:, DRUM])
 
     def _put(
@@ -289,32 +315,55 @@ class VectorPlant:
             after = np.column_stack(state)
             for index in np.flatnonzero(close).tolist():
                 then, now = (CraneState(*rows[index].tolist()) for rows in (before, after))
-                stopped = stop(self._obstacles[index], then, now)
+                stopped = self._stop(index, then, now)
                 if stopped is not None:
-                    self._position[index, SWAY : REACH + 1] = stopped[:2]
-                    self._velocity[index, SWAY : REACH + 1] = stopped[2:4]
+                    self._position[index, self._below] = stopped.position
+                    self._velocity[index, self._below] = stopped.velocity
                     hardest[index] = max(hardest[index], stopped.speed)
         return unable
 
+    def _stop(self, index: int, before: CraneState, now: CraneState) -> Stopped | None:
+        obstacles, rigging = self._obstacles[index], self._rigging
+        if rigging is None:
+            return stop(obstacles, before, now)
+        cable, swing, rate = self._hanging(index)
+        mass = self.cranes[index].payload_mass
+        return rigging.stop(obstacles, before, now, cable, swing, rate, mass)
+
+    def _hanging(self, index: int) -> tuple[CraneState, float, float]:
+        """Motion of one crane by its cable, and of its slings from the cable."""
+        setpoint, error, sway, reach, swing, _ = self._position[index].tolist()
+        rates = self._velocity[index].tolist()
+        cable = CraneState(setpoint + error, rates[0] + rates[1], reach, rates[3], sway, rates[2])
+        return cable, swing, rates[4]
+
     def measure(self) -> tuple[CraneState, NDArray[np.float64]]:
-        """Motion of each crane now, and the tensions of the cables [N], arrays of shape (N,)."""
-        setpoint, error, sway, reach, drum = self._position.T
-        setpoint_rate, error_rate, sway_rate, reach_rate, drum_rate = self._velocity.T
+        """Motion of each crane now, and the tensions of the cables [N], arrays of shape (N,).
+
+        With a rigging, as `Plant.measure`: one by one, so that no sine differs in its last bit.
+        """
+        reach, drum = self._position[:, REACH], self._position[:, DRUM]
+        reach_rate, drum_rate = self._velocity[:, REACH], self._velocity[:, DRUM]
         stiffness, damping = self._cable_gains[:, 1], self._cable_gains[:, 2]
         pull = cable_pull(stiffness, damping, reach, reach_rate, drum, drum_rate)
-        state: Any = CraneState(
-            setpoint + error,
-            setpoint_rate + error_rate,
-            reach.copy(),
-            reach_rate.copy(),
-            sway.copy(),
-            sway_rate.copy(),
-        )
+        state = self.cable()
+        if self._rigging is not None:
+            rows = [self._rigging.payload(*self._hanging(index)) for index in range(len(self))]
+            state = CraneState._make(np.array(rows).T)
         return state, np.maximum(0.0, pull)
+
+    def cable(self) -> CraneState:
+        """Motion of each trolley and cable now, see `Plant.cable`; arrays of shape (N,)."""
+        setpoint, error, sway, reach = self._position.T[: REACH + 1]
+        setpoint_rate, error_rate, sway_rate, reach_rate = self._velocity.T[: REACH + 1]
+        each: Any = (setpoint + error, setpoint_rate + error_rate, reach, reach_rate)
+        return CraneState._make(np.array((*each, sway, sway_rate)))
 
     def states(self) -> NDArray[np.float64]:
         """Motion of each crane now, in the order of `CraneState`, shape (N, 6)."""
         return np.column_stack(self.measure()[0])
+
+    rigging: Rigging | None = fixed("rigging", "make a new VectorPlant", "Below the hooks.")
 
     @property
     def setpoint_velocity(self) -> NDArray[np.float64]:

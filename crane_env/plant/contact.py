@@ -22,6 +22,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from crane_env.kinematics import about_sheave
 from crane_env.observation import CraneState, largest_state
 from crane_env.parameters import CraneParameters
 from crane_env.tasks.task import Obstacle, Place, place_of
@@ -33,21 +34,33 @@ SLOWEST_IMPACT = 0.05
 """Speed across a face from which meeting it is a collision, below it is a touch [m/s]; assumed."""
 
 
-class Stopped(NamedTuple):
-    """What obstacles made of a payload's motion.
+class Halt(NamedTuple):
+    """What obstacles made of the motion of a point.
 
     Attributes:
-        sway: [rad].
-        reach: sheave to payload [m].
-        sway_rate: [rad/s].
-        reach_rate: [m/s].
+        place: where it is now.
+        velocity: along the girder and down [m/s].
+        axes: in which it was changed: 0 along the girder, 1 down.
         speed: of the collision, across the face; 0 if there was none [m/s].
     """
 
-    sway: float
-    reach: float
-    sway_rate: float
-    reach_rate: float
+    place: Place
+    velocity: tuple[float, float]
+    axes: tuple[int, ...]
+    speed: float
+
+
+class Stopped(NamedTuple):
+    """What obstacles made of the joints below the trolley, of sway, reach and what follows.
+
+    Attributes:
+        position: [rad], [m].
+        velocity: [rad/s], [m/s].
+        speed: of the collision, across the face; 0 if there was none [m/s].
+    """
+
+    position: tuple[float, ...]
+    velocity: tuple[float, ...]
     speed: float
 
 
@@ -72,22 +85,35 @@ class Outline(NamedTuple):
 
 
 def stop(obstacles: Sequence[Obstacle], before: CraneState, now: CraneState) -> Stopped | None:
-    """Stops a payload at the obstacles that it met; None if it met none.
+    """Stops a payload on the cable at the obstacles that it met; None if it met none.
 
     Args:
         obstacles: that stand in its way.
         before: the crane a physics step ago.
         now: the crane.
     """
+    met = halt(obstacles, before, now)
+    if met is None:
+        return None
+    (x, depth), (across, down) = met.place, met.velocity
+    sway, reach, sway_rate, reach_rate = about_sheave(
+        x - now.trolley_position, depth, across - now.trolley_velocity, down
+    )
+    return Stopped((sway, reach), (sway_rate, reach_rate), met.speed)
+
+
+def halt(obstacles: Sequence[Obstacle], before: CraneState, now: CraneState) -> Halt | None:
+    """Stops the point that is the payload at the obstacles that it met; see `stop`."""
     start, (x, depth) = place_of(before), place_of(now)
     velocity: tuple[float, float] | None = None
-    speed = 0.0
+    speed, axes = 0.0, set()
     for obstacle in obstacles:
         face = _entered(obstacle, start, x, depth)
         if face is None:
             continue
-        came_across, came_down = _velocity(before)
-        across, down = velocity or _velocity(now)
+        came_across, came_down = velocity_of(before)
+        across, down = velocity or velocity_of(now)
+        axes.add(1 if face == 0.0 else 0)
         if face == 0.0:
             depth = obstacle.top - SKIN
             velocity, inward = (across, min(down, 0.0)), came_down
@@ -99,19 +125,10 @@ def stop(obstacles: Sequence[Obstacle], before: CraneState, now: CraneState) -> 
             speed = max(speed, inward)
     if velocity is None:
         return None
-    ahead = x - now.trolley_position
-    across, down = velocity[0] - now.trolley_velocity, velocity[1]
-    reach = math.hypot(ahead, depth)
-    return Stopped(
-        math.atan2(ahead, depth),
-        reach,
-        (across * depth - ahead * down) / reach**2,
-        (ahead * across + depth * down) / reach,
-        speed,
-    )
+    return Halt(Place(x, depth), velocity, tuple(sorted(axes)), speed)
 
 
-def _velocity(state: CraneState) -> tuple[float, float]:
+def velocity_of(state: CraneState) -> tuple[float, float]:
     """Velocity of the payload along the girder and down [m/s]."""
     _, rate, length, length_rate, sway, sway_rate = state
     sine, cosine, swing = math.sin(sway), math.cos(sway), length * sway_rate

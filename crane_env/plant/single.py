@@ -24,78 +24,32 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from importlib import resources
-from typing import Any
 
 import mujoco
 import numpy as np
 
 from crane_env.observation import CraneState, is_sound, largest_state
 from crane_env.parameters import CraneParameters
-from crane_env.plant.contact import Outline, stop
-from crane_env.plant.drives import Drives, Stroke
+from crane_env.plant.contact import Outline, Stopped, stop
+from crane_env.plant.drives import Drives
+from crane_env.plant.model import (
+    DRUM,
+    REACH,
+    SETPOINT,
+    SWAY,
+    build_model,
+    cable_gains,
+    cable_pull,
+    drum_stroke,
+    hang,
+    hook_of,
+    joint_positions,
+)
 from crane_env.plant.outcome import Outcome
+from crane_env.plant.rigging import Rigging
 from crane_env.plant.start import AT_REST, Start
 from crane_env.support.fixed import fixed
 from crane_env.tasks.task import Obstacle, place_of
-
-SETPOINT, DRIVE_ERROR, SWAY, REACH, DRUM = range(5)
-"""Places of the joints among positions and velocities."""
-
-SLACKEST_REACH = 0.3
-"""Share of the shortest cable length at which a payload that flies up meets the sheave."""
-
-
-def build_model(parameters: CraneParameters) -> mujoco.MjModel:
-    """MuJoCo model of the crane with these parameters."""
-    path = resources.files("crane_env.plant") / "crane.xml"
-    model = mujoco.MjModel.from_xml_string(path.read_text(encoding="utf-8"))
-    model.opt.timestep = parameters.control_period / parameters.substeps
-    model.opt.gravity[2] = -parameters.gravity
-    model.body("trolley").mass[0] = parameters.trolley_mass
-    rail = model.tendon("rail").id
-    model.tendon_damping[rail] = parameters.trolley_friction
-    model.tendon_range[rail] = (-parameters.rail_half_length, parameters.rail_half_length)
-    shortest, longest = parameters.cable_length_min, parameters.cable_length_max
-    model.joint("reach").range = (SLACKEST_REACH * shortest, 2.0 * longest)
-    model.joint("sway").damping[0] = parameters.sway_friction
-    position_loop, velocity_loop = drive_loops(parameters)
-    model.joint("drive_error").stiffness[0] = position_loop
-    model.joint("drive_error").damping[0] = velocity_loop
-    hang(model, parameters.payload_mass)
-    return model
-
-
-def hang(model: mujoco.MjModel, payload_mass: float) -> None:
-    """Hangs a payload of this mass [kg] on the cable of a model."""
-    model.body("payload").mass[0] = payload_mass
-    mujoco.mj_setConst(model, mujoco.MjData(model))
-
-
-def drive_loops(parameters: CraneParameters) -> tuple[float, float]:
-    """Gains of the trolley drive's position loop [N/m] and velocity loop [N s/m]."""
-    velocity_loop = parameters.trolley_mass * parameters.drive_bandwidth
-    return velocity_loop * parameters.drive_bandwidth / 4.0, velocity_loop
-
-
-def cable_gains(stiffness: Any, damping: Any, unstretched_length: Any) -> tuple[Any, Any, Any]:
-    """Bias of the actuator "cable": 0, -K_l / l_0 and -C_l / l_0; of floats or arrays."""
-    return 0.0, -stiffness / unstretched_length, -damping / unstretched_length
-
-
-def cable_pull(
-    stiffness: Any, damping: Any, reach: Any, reach_rate: Any, drum: Any, drum_rate: Any
-) -> Any:
-    """Tension of the cable [N] before it is cut off at 0, from `cable_gains`; floats or arrays."""
-    return stiffness * (drum - reach) + damping * (drum_rate - reach_rate)
-
-
-def drum_stroke(parameters: CraneParameters) -> Stroke:
-    """Unstretched lengths [m] that the hoist's limit switches allow."""
-    return Stroke.between(
-        parameters.unstretched_length(parameters.cable_length_min),
-        parameters.unstretched_length(parameters.cable_length_max),
-    )
 
 
 class Plant:
@@ -103,29 +57,33 @@ class Plant:
 
     Args:
         parameters: what the crane is made of.
+        rigging: below the hook, which makes a double pendulum of the payload; None: the payload is
+            a point on the cable.
+
+    Raises:
+        ValueError: the crane cannot be simulated with this rigging.
     """
 
-    def __init__(self, parameters: CraneParameters) -> None:
+    def __init__(self, parameters: CraneParameters, rigging: Rigging | None = None) -> None:
         self._parameters = parameters
-        self.model = build_model(parameters)
+        self._rigging = rigging
+        self.model = build_model(parameters, rigging)
         self.data = mujoco.MjData(self.model)
         self._bind()
         self.reset()
 
     parameters: CraneParameters = fixed("parameters", "make a new Plant", "The crane.")
+    rigging: Rigging | None = fixed("rigging", "make a new Plant", "Below the hook.")
 
     def _bind(self) -> None:
         """Resolves names once and keeps views of the arrays that every step touches."""
         model, data, parameters = self.model, self.data, self._parameters
-        names = ("setpoint", "drive_error", "sway", "reach", "drum")
-        order = tuple(int(model.joint(name).qposadr[0]) for name in names)
-        if order != tuple(range(len(names))):
-            raise RuntimeError(f"crane.xml must declare its joints in the order {names}.")
         self._position, self._velocity, self._control = data.qpos, data.qvel, data.ctrl
         cable = model.actuator("cable").id
         self._cable_gains = model.actuator_biasprm[cable, :3]
         self._trolley_force = data.xfrc_applied[model.body("trolley").id]
-        self._payload_force = data.xfrc_applied[model.body("payload").id]
+        self._payload_force = data.xfrc_applied[hook_of(model) + (self._rigging is not None)]
+        self._below = slice(SWAY, len(data.qpos) - 1)
         self._substeps = parameters.substeps
         self._refit()
 
@@ -140,6 +98,7 @@ class Plant:
         mujoco.mj_getState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
         return {
             "parameters": self._parameters,
+            "rigging": self._rigging,
             "obstacles": self._obstacles,
             "state": state,
             "gains": self._cable_gains.copy(),
@@ -147,7 +106,7 @@ class Plant:
 
     def __setstate__(self, saved: dict[str, object]) -> None:
         """Rebuilds the model and restores the state."""
-        self.__init__(saved["parameters"])  # type: ignore[misc]
+        self.__init__(saved["parameters"], saved["rigging"])  # type: ignore[misc]
         self.reset(obstacles=saved["obstacles"])  # type: ignore[arg-type]
         self._cable_gains[:] = saved["gains"]
         signature = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -164,7 +123,8 @@ class Plant:
         Raises:
             ValueError: a value outside its range.
         """
-        position, velocity = start.coordinates(self._parameters)
+        place = start.coordinates(self._parameters)
+        position, velocity = joint_positions(place, self._rigging)
         self._obstacles = tuple(obstacles)
         self._outline = Outline.of(obstacles, self._parameters)
         self._put(position, velocity, position[DRUM])
@@ -227,13 +187,20 @@ class Plant:
             state = self.state()
             if not is_sound(state, self._largest):
                 break
-            stopped = stop(self._obstacles, before, state)
+            stopped = self._stop(before, state)
             if stopped is not None:
-                self._position[SWAY : REACH + 1] = stopped[:2]
-                self._velocity[SWAY : REACH + 1] = stopped[2:4]
+                self._position[self._below] = stopped.position
+                self._velocity[self._below] = stopped.velocity
                 hardest = max(hardest, stopped.speed)
                 state = self.state()
         return hardest
+
+    def _stop(self, before: CraneState, now: CraneState) -> Stopped | None:
+        if self._rigging is None:
+            return stop(self._obstacles, before, now)
+        swing, rate = float(self._position[REACH + 1]), float(self._velocity[REACH + 1])
+        mass = self._parameters.payload_mass
+        return self._rigging.stop(self._obstacles, before, now, self.cable(), swing, rate, mass)
 
     def strike(self, speed: float) -> None:
         """Strikes the payload across the cable, so that its speed changes by this [m/s]."""
@@ -264,8 +231,13 @@ class Plant:
         """
         if payload_mass == self._parameters.payload_mass:
             return
-        self._parameters = dataclasses.replace(self._parameters, payload_mass=payload_mass)
-        hang(self.model, payload_mass)
+        parameters = dataclasses.replace(self._parameters, payload_mass=payload_mass)
+        if self._rigging is not None:
+            self._rigging.check(parameters)
+        self._parameters = parameters
+        model = self.model
+        hang(model.body_mass, model.body_inertia, hook_of(model), payload_mass, self._rigging)
+        mujoco.mj_setConst(model, mujoco.MjData(model))
         self._refit()
 
     def _set_cable_gains(self, unstretched_length: float) -> None:
@@ -275,15 +247,27 @@ class Plant:
         )
 
     def measure(self) -> tuple[CraneState, float]:
-        """Motion of trolley, cable and payload now, and the tension of the cable [N]."""
-        setpoint, error, sway, reach, drum = self._position.tolist()
-        setpoint_rate, error_rate, sway_rate, reach_rate, drum_rate = self._velocity.tolist()
+        """Motion of trolley, cable and payload now, and the tension of the cable [N].
+
+        With a rigging, length and sway are those of the straight line from sheave to payload.
+        """
+        setpoint, error, sway, reach, *swing, drum = self._position.tolist()
+        velocity = self._velocity.tolist()
+        setpoint_rate, error_rate, sway_rate, reach_rate, *swing_rate, drum_rate = velocity
         _, stiffness, damping = self._cable_gains.tolist()
         pull = cable_pull(stiffness, damping, reach, reach_rate, drum, drum_rate)
         state = CraneState(
             setpoint + error, setpoint_rate + error_rate, reach, reach_rate, sway, sway_rate
         )
+        if self._rigging is not None:
+            state = self._rigging.payload(state, swing[0], swing_rate[0])
         return state, max(0.0, pull)
+
+    def cable(self) -> CraneState:
+        """Motion of trolley and cable now, as sensors see it; without a rigging as `state`."""
+        setpoint, error, sway, reach = self._position[: REACH + 1].tolist()
+        rates = self._velocity[: REACH + 1].tolist()
+        return CraneState(setpoint + error, rates[0] + rates[1], reach, rates[3], sway, rates[2])
 
     def state(self) -> CraneState:
         """Motion of trolley, cable and payload now."""

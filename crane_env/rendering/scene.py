@@ -220,7 +220,7 @@ class VectorRenderer:
 
     def __init__(self, plant: VectorPlant, width: int, height: int) -> None:
         self._plant = plant
-        self._copies = [Plant(crane) for crane in plant.cranes]
+        self._copies = [Plant(crane, plant.rigging) for crane in plant.cranes]
         self._renderers: list[CraneRenderer] = []
         for twin in self._copies:
             self._renderers.append(CraneRenderer(twin, width=width, height=height, window=False))

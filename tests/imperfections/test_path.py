@@ -24,6 +24,7 @@ OPERATORS = ["random", "stress", "manoeuvre"]
 STEPS = 120
 ACTIONS = np.random.default_rng(0).uniform(-3.0, 3.0, (STEPS, 4, 1))
 EVERY_SET = [*PARTS, "field:3"]
+MIXED = [name for name in PARTS if name != "double-pendulum"]  # that one is another plant
 
 
 def played(env: Any, seed: int) -> list[Any]:
@@ -52,7 +53,7 @@ def test_severity_zero_is_the_plain_crane_bit_for_bit(names: set[str], seed: int
         assert repr(info) == repr(without)
 
 
-@given(st.sets(st.sampled_from(list(PARTS)), min_size=1), st.integers(0, 10**6))
+@given(st.sets(st.sampled_from(MIXED), min_size=1), st.integers(0, 10**6))
 @settings(max_examples=4, deadline=None)
 def test_a_crane_without_severity_is_plain_beside_cranes_with_it(
     names: set[str], seed: int
@@ -75,7 +76,8 @@ def test_a_crane_without_severity_is_plain_beside_cranes_with_it(
 )
 def test_many_cranes_are_single_cranes_bit_for_bit(name: str, mode: AutoresetMode) -> None:
     parts = make_imperfections(name)
-    each = [scaled(parts, factor) for factor in (0.3, 1.0, 0.0, 2.0)]
+    factors = (0.3, 1.0, 0.0, 2.0) if name != "double-pendulum" else (0.7,) * 4
+    each = [scaled(parts, factor) for factor in factors]
 
     def one(index: int) -> Any:
         return gymnasium.make("OILCrane-v0", imperfections=each[index], max_episode_steps=70)
@@ -234,7 +236,7 @@ def test_one_crane_among_plain_ones_is_given_imperfections_for_an_episode() -> N
 def fuzz(steps: int, count: int) -> None:
     """Random cranes, operators, tasks, severities and actions: numbers stay numbers."""
     rng = np.random.default_rng(1)
-    names = [*PARTS, *SCENARIOS]
+    names = [*MIXED, *(name for name in SCENARIOS if name != "long-payload")]
     each = []
     for _ in range(count):
         name = str(rng.choice(names))

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from crane_env.imperfections.force import Bumps, SteadyForce
-from crane_env.imperfections.payload import Ground, PayloadMass
+from crane_env.imperfections.payload import DoublePendulum, Ground, PayloadMass
 from crane_env.operators.base import RELEASED, ButtonEvent
+from crane_env.tasks.task import place_of
 from tests.imperfections.at_work import PERIOD, begun
 from tests.imperfections.test_wind import at
 
@@ -83,3 +84,48 @@ def test_a_payload_is_set_down_on_the_ground_and_lifted_again() -> None:
     assert depths[-1] < 8.9
     assert max(tensions[125:]) > 2.0 * 981.0, "it was snapped off"
     assert min(tensions) >= 0.0
+
+
+def test_a_double_pendulum_is_measured_at_its_cable_and_judged_at_its_payload() -> None:
+    slings = DoublePendulum(offset=2.0, severity=0.5)
+    env = hanging([slings])
+    _, info = env.reset(seed=0)
+    assert info["measurement"][2] == pytest.approx(8.0)
+    assert info["truth"][2] == pytest.approx(9.0)
+    bent = 0.0
+    for k in range(60):
+        _, _, _, _, info = env.step(np.array([math.cos(k / 12.0)]))
+        truth, measured = info["truth"], info["measurement"]
+        assert measured[4] == env.plant.cable().sway_angle
+        assert info["payload_position"] == truth[0] + truth[2] * math.sin(truth[4])
+        bent = max(bent, abs(truth[4] - measured[4]))
+    assert bent > 1e-3
+    env.reset(options={"imperfections": None})
+    assert env.plant.rigging is None
+
+
+def test_a_double_pendulum_stands_above_the_ground_and_is_set_down() -> None:
+    env = hanging([DoublePendulum(), Ground(height=10.0)])
+    env.reset(seed=0)
+    for _ in range(30):
+        info = env.step(np.array([1.0]))[4]
+        assert info["collision_speed"] == 0.0
+    down = [ButtonEvent(0.0, RELEASED._replace(down=True)), ButtonEvent(1.0, RELEASED)]
+    env.reset(seed=0, options={"operator": down})
+    tensions = [env.step(RESTING)[4]["cable_tension"] for _ in range(75)]
+    assert min(tensions) == 0.0
+    assert place_of(env.plant.state()).depth == pytest.approx(9.05, abs=0.01)
+
+
+def test_cranes_of_a_vector_environment_have_the_same_slings_or_none() -> None:
+    slings, other = DoublePendulum(), DoublePendulum(severity=0.5)
+    for each in ([[slings], [other]], [[slings], None]):
+        with pytest.raises(ValueError, match="double pendulum is another plant"):
+            gymnasium.make_vec("OILCrane-v0", num_envs=2, imperfections=each)
+    with pytest.raises(ValueError, match="severity is not randomised"):
+        gymnasium.make_vec(
+            "OILCrane-v0", imperfections=[slings], randomisation={"severity": (0.5, 1.0)}
+        )
+    env = gymnasium.make_vec("OILCrane-v0", num_envs=2)
+    with pytest.raises(ValueError, match="double pendulum is another plant"):
+        env.reset(options={"imperfections": "long-payload"})

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from crane_env.imperfections.base import MOST_SEVERE
 from crane_env.imperfections.registry import (
+    OUT_OF_FIELD,
     PARTS,
     SCENARIOS,
     describe,
@@ -49,11 +50,9 @@ def test_parts_stand_in_the_order_of_the_signals_whatever_the_order_given() -> N
         make_imperfections(names)
 
 
-def test_field_is_all_but_a_steady_force_at_their_typical_size_and_says_where_it_comes_from() -> (
-    None
-):
-    lasting = [part for part in PARTS.values() if part.name != "steady-force"]
-    assert make_imperfections("field") == tuple(lasting), "the wind of the field changes"
+def test_field_is_what_all_cranes_can_have_and_says_where_it_comes_from() -> None:
+    lasting = [part for part in PARTS.values() if part.name not in OUT_OF_FIELD]
+    assert make_imperfections("field") == tuple(lasting)
     for part in PARTS.values():
         assert part.severity == 1.0
         for field in dataclasses.fields(part):

@@ -161,7 +161,7 @@ def test_no_speed_carries_a_payload_through_and_an_impact_only_takes_speed(
     if stopped is None:
         assert not WALL.holds(place_of(after))
         return
-    sway, reach, sway_rate, reach_rate, speed = stopped
+    (sway, reach), (sway_rate, reach_rate), speed = stopped
     now = CraneState(trolley, 0.0, reach, reach_rate, sway, sway_rate)
     assert not WALL.holds(place_of(now))
     kept = payload_velocity(*now[1:]), down(now)

@@ -15,7 +15,8 @@ from scipy.special import jv, yv
 
 from crane_env.kinematics import payload_velocity
 from crane_env.parameters import CraneParameters
-from crane_env.plant.single import DRIVE_ERROR, SETPOINT, Plant
+from crane_env.plant.model import DRIVE_ERROR, SETPOINT
+from crane_env.plant.single import Plant
 from crane_env.plant.start import Start
 from tests.plant.elastic_crane import simulate
 
