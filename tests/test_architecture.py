@@ -20,6 +20,7 @@ ALLOWED = {
     "scripts": {"scripts", "baselines", "crane_env"},
 }
 TOUCH_MUJOCO = {
+    "crane_env/plant/model.py",
     "crane_env/plant/single.py",
     "crane_env/plant/batch.py",
     "crane_env/rendering/scene.py",
