@@ -13,7 +13,7 @@ import pytest
 import crane_env
 from baselines import make_controller
 from baselines.mpc.l1 import BLOCKS, PREDICTION_HORIZON, SWAY_STEP, L1Mpc, L1Settings
-from baselines.mpc.quadratic_program import SOFTNESS, QuadraticProgram
+from baselines.mpc.quadratic_program import SOFTNESS, QpSolution, QuadraticProgram
 from baselines.mpc.settings import MpcSettings
 from crane_env.parameters import CraneParameters
 from crane_env.stage_cost import StageCost
@@ -99,6 +99,23 @@ def test_a_manoeuvre_is_followed_within_the_limit_of_sway(
     assert math.degrees(metrics.max_sway) < sway
     assert error > metrics.IAE
     assert metrics.solver_failures == 0
+
+
+def test_a_failed_solve_is_counted_and_the_plan_before_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mpc = controller()
+    seen = np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+    first = float(mpc.act(seen)[0])
+    failed = QpSolution(None, np.zeros(0), 7, -4)
+    monkeypatch.setattr(QuadraticProgram, "solve", lambda *program: failed)
+    again = [float(mpc.act(seen)[0]) for _ in range(150)]
+    assert first > 0.0
+    assert again[0] > 0.0
+    assert mpc.statistics.failures == 150
+    assert mpc.statistics.braking_steps == 150 - BLOCKS.sum() + 1
+    monkeypatch.undo()
+    assert np.isfinite(mpc.act(seen)).all()
 
 
 @pytest.mark.parametrize(
