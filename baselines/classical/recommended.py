@@ -3,15 +3,15 @@
 As `flat`, it plans the payload's velocity y_d from the buttons and drives the trolley along. It
 differs in two things.
 
-The plan. A press is answered by one course S(t) of y_d from 0 to 1 m/s, a release by its mirror
+The plan. A press is answered by one course S(t) of y_d / v from 0 to 1, a release by its mirror
 image, whatever the cable does: the payload begins late and stops late by the same lag, and is
 displaced by the integral of w. S is the solution, at one length l and found once, of
 
     minimise    integral of (1 - S) dt + mu integral of u^2 dt        u = S' + l S''' / g
-    subject to  |S'| <= g theta_max,  0 <= S <= 1,  |u| <= a_max at the longest cable
+    subject to  |S'| <= g theta_max / v,  0 <= S <= 1,  |u| <= a_max / v at the longest cable
 
-that is the shortest lag at a price on the effort, with S''' constant over intervals of a few
-control periods: a quadratic program.
+that is the shortest lag at a price on the effort, v being the travel speed. With S''' constant over
+intervals of a few control periods it is a quadratic program.
 
 The feedback is that of `lqr_integral` on the deviation from the plan, so that the payload is led
 back not to the planned speed only, but to where the plan has it. Displacement lost to the elastic
@@ -50,7 +50,7 @@ from crane_env.parameters import CraneParameters
 from crane_env.support.checks import within
 from crane_env.support.fields import check_fields, from_fields
 
-INTERVALS = 80
+INTERVALS = 100
 """Of constant S''' in a course."""
 
 FORGIVEN = 0.5
@@ -63,8 +63,8 @@ class RecommendedSettings:
 
     Attributes:
         duration: of the course, rounded up to whole intervals [s]; None: the time of the steepest
-            ramp that sway and drive allow, and half a sway more.
-        effort_weight: mu [s^3/m].
+            ramp that sway and drive allow, and half a sway of the longest cable.
+        effort_weight: mu [s^2].
         sway_limit: theta_max of the plan [rad].
         lean_time: tau_b [s].
         feedback: what the feedback minimises on the deviation from the plan.
@@ -85,7 +85,7 @@ class RecommendedSettings:
         """Refuses what makes no course."""
         if self.duration is not None:
             check_fields(self, within, ("duration",), 0.1, 1000.0, "s")
-        check_fields(self, within, ("effort_weight",), 1e-6, 1e6, "s^3/m")
+        check_fields(self, within, ("effort_weight",), 1e-6, 1e6, "s^2")
         check_fields(self, within, ("sway_limit",), 1e-3, 1.0, "rad")
         check_fields(self, within, ("lean_time",), 0.1, 1e6, "s")
         object.__setattr__(self, "feedback", LqrIntegralSettings.of(self.feedback))
@@ -115,34 +115,29 @@ def course(crane: CraneParameters, settings: RecommendedSettings) -> NDArray[np.
     """
     period, g, speed = crane.control_period, crane.gravity, crane.travel_speed
     steepest, most = g * settings.sway_limit, crane.acceleration_max
-    half_turn = 0.5 * crane.sway_period(crane.cable_length_initial)
+    half_turn = 0.5 * crane.sway_period(crane.cable_length_max)
     duration = settings.duration or speed / min(steepest, most) + half_turn
     held = math.ceil(duration / (period * INTERVALS))
     step = held * period
-    # S'', S' and S at the ends of the intervals, by S''' in each.
-    sums = np.tril(np.ones((INTERVALS, INTERVALS)))
-    bend = step * sums
-    before = np.vstack((np.zeros(INTERVALS), bend[:-1]))
-    slope = sums @ (step * before + 0.5 * step**2 * np.eye(INTERVALS))
-    before_slope = np.vstack((np.zeros(INTERVALS), slope[:-1]))
-    value = sums @ (
-        step * before_slope + 0.5 * step**2 * before + step**3 / 6.0 * np.eye(INTERVALS)
-    )
-    middle = 0.5 * (slope + before_slope)
+    # In intervals as the unit of time: S'', S' and S at their ends, by S''' in each.
+    unit, sums = np.eye(INTERVALS), np.tril(np.ones((INTERVALS, INTERVALS)))
+    bend, before = sums, sums - unit
+    slope = sums @ (before + 0.5 * unit)
+    before_slope = slope - before - 0.5 * unit
+    value = sums @ (before_slope + 0.5 * before + unit / 6.0)
 
-    # By travel_speed times the course: the plan of a press.
-    effort = speed * (middle + crane.cable_length_initial / g * np.eye(INTERVALS))
-    hardest = speed * (middle + crane.cable_length_max / g * np.eye(INTERVALS))
+    middle, square = 0.5 * (slope + before_slope), g * step * step
+    effort = middle + crane.cable_length_initial / square * unit
+    hardest = middle + crane.cable_length_max / square * unit
     last = np.array([value[-1], slope[-1], bend[-1]])
     matrix = np.concatenate((slope, value, hardest, last))
-    leaning = steepest / speed
     ones, end = np.ones(INTERVALS), np.array([1.0, 0.0, 0.0])
-    free = np.full(INTERVALS, 1e6)
+    free, leaning, driven = (a * ones for a in (1e6, steepest * step / speed, most * step / speed))
     found = QuadraticProgram(matrix).solve(
-        2.0 * settings.effort_weight * step * effort.T @ effort,
-        -step * value.sum(axis=0),
-        np.concatenate((-free, -leaning * ones, 0.0 * ones, -most * ones, end)),
-        np.concatenate((free, leaning * ones, ones, most * ones, end)),
+        2.0 * settings.effort_weight / step**2 * effort.T @ effort,
+        -value.sum(axis=0),
+        np.concatenate((-free, -leaning, 0.0 * ones, -driven, end)),
+        np.concatenate((free, leaning, ones, driven, end)),
     )
     if found.minimiser is None:
         raise ValueError(
@@ -150,7 +145,7 @@ def course(crane: CraneParameters, settings: RecommendedSettings) -> NDArray[np.
             f"of this crane's drive and {math.degrees(settings.sway_limit):.3g} degrees of sway."
         )
     states, state = [], np.zeros(3)
-    for third in np.repeat(found.minimiser, held).tolist():
+    for third in np.repeat(found.minimiser / step**3, held).tolist():
         s, s1, s2 = state
         state = np.array(
             [

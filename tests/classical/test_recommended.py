@@ -16,6 +16,7 @@ from baselines import make_controller
 from baselines.classical.recommended import RecommendedSettings, course
 from crane_env.parameters import CraneParameters
 from tests.classical.pendulum import drive
+from tests.plant.accepted_cranes import accepted_crane
 
 CRANE = CraneParameters()
 CONTROLLER = make_controller("recommended")
@@ -41,6 +42,14 @@ def test_the_course_keeps_its_limits_and_ends_where_it_should(
     wanted = acceleration[1:] + crane.cable_length_max / crane.gravity * third
     assert np.abs(wanted).max() < 1.05 * crane.acceleration_max
     np.testing.assert_allclose(np.diff(velocity) / crane.control_period, acceleration[1:], atol=0.1)
+
+
+def test_every_crane_has_a_course_of_default_duration() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(15):
+        crane = accepted_crane(lambda low, high: low * (high / low) ** rng.random())
+        if crane is not None:
+            assert course(crane, RecommendedSettings())[0, -1] == 1.0
 
 
 @settings(max_examples=10, deadline=None)
