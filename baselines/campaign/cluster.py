@@ -7,6 +7,7 @@ trajectories, if they are kept, need a folder that all machines see under the sa
 
 from __future__ import annotations
 
+import dataclasses
 import faulthandler
 import logging
 import os
@@ -14,6 +15,8 @@ import signal
 import sys
 import threading
 from collections.abc import Generator, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from baselines.evaluation.results import EpisodeResult
@@ -28,6 +31,7 @@ from baselines.evaluation.workers import (
     import_paths,
     in_turn,
     perform,
+    text_of,
 )
 from crane_env.support.extras import require
 
@@ -59,16 +63,21 @@ def play_on_cluster(
         OSError: there is no such cluster, or a trajectory cannot be kept.
     """
     ray = require("ray", extra="cluster")
-    with environment({**QUIET, **ONE_THREAD}):
+    if not tasks:
+        return
+    # Diaries lie in the folder of the results: other machines may see that one.
+    diaries = TemporaryDirectory(prefix=".diaries-", dir=tasks[0].folder)
+    with environment({**QUIET, **ONE_THREAD}), diaries as diary:
         connect(ray, address, jobs)
         try:
             # Repeating what was lost is our own affair.
             remote = ray.remote(max_retries=0, num_cpus=1)(perform_in_time)
 
             def start(task: Task) -> Any:
-                return remote.remote(task, episode_time_max)
+                noted = dataclasses.replace(task, diary=Path(diary, task.key))
+                return remote.remote(noted, episode_time_max)
 
-            def outcome(handle: Any) -> EpisodeResult | Lost | OSError:
+            def outcome(handle: Any, task: Task) -> EpisodeResult | Lost | OSError:
                 try:
                     result: EpisodeResult = ray.get(handle)
                     return result
@@ -78,11 +87,12 @@ def play_on_cluster(
                     raise
                 except ray.exceptions.RayError as error:
                     told = str(error)
-                    return Lost(f"The worker was lost: {told.splitlines()[0]}", told)
+                    where = text_of(Path(diary, task.key)) or told
+                    return Lost(f"The worker was lost: {told.splitlines()[0]}", where)
 
             def ended(waiting: Mapping[Any, Task]) -> Ended[Any]:
                 done, _ = ray.wait(list(waiting), num_returns=1, timeout=TICK)
-                return {handle: outcome(handle) for handle in done}
+                return {handle: outcome(handle, waiting[handle]) for handle in done}
 
             def ahead() -> int:
                 return max(1, AHEAD * int(ray.cluster_resources().get("CPU", 0)))
@@ -120,11 +130,14 @@ def perform_in_time(task: Task, time_max: float) -> EpisodeResult:
     """Plays an episode as `perform` does, and ends the process, where that is, if it hangs.
 
     Args:
-        task: the episode.
+        task: the episode; its diary is kept if this machine sees the folder that it is in.
         time_max: an episode that takes longer hangs [s].
     """
-    faulthandler.dump_traceback_later(time_max, exit=True)
-    try:
-        return perform(task)
-    finally:
-        faulthandler.cancel_dump_traceback_later()
+    if task.diary is None or not task.diary.parent.is_dir():
+        task = dataclasses.replace(task, diary=None)
+    with Path(task.diary or os.devnull).open("a", encoding="utf-8") as diary:
+        faulthandler.dump_traceback_later(time_max, exit=True, file=diary)
+        try:
+            return perform(task)
+        finally:
+            faulthandler.cancel_dump_traceback_later()

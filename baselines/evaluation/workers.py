@@ -193,7 +193,7 @@ def play_all(
                 why = obituary(expired.exitcode)
             except OSError as error:
                 return error
-            return Lost(why, _text_of(Path(diary, task.key)))
+            return Lost(why, text_of(Path(diary, task.key)))
 
         def ended(waiting: Mapping[Future[EpisodeResult], Task]) -> Ended[Future[EpisodeResult]]:
             done, _ = wait(waiting, timeout=TICK, return_when=FIRST_COMPLETED)
@@ -434,7 +434,8 @@ def obituary(exit_code: Any) -> str:
     return f"The worker process ended {ended}."
 
 
-def _text_of(file: Path) -> str:
+def text_of(file: Path) -> str:
+    """What is in a file; nothing if it is not there."""
     try:
         return file.read_text(encoding="utf-8", errors="replace")
     except OSError:
