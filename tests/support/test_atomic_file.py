@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file
+from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file, make_folder
 
 
 def write(target: Path, text: str) -> None:
@@ -83,3 +83,15 @@ def test_the_targets_permissions_are_kept_and_new_ones_are_the_umasks(
         write(target, "text")
     modes = [stat.S_IMODE(file.stat().st_mode) for file in (kept, new)]
     assert modes == [mode, stat.S_IMODE(plain.stat().st_mode)]
+
+
+def test_a_folder_is_made_with_those_on_the_way_but_none_that_was_deleted_meanwhile(
+    tmp_path: Path,
+) -> None:
+    deep = tmp_path / "one" / "two"
+    make_folder(deep, below=tmp_path)
+    make_folder(deep, below=tmp_path)
+    assert deep.is_dir()
+    with pytest.raises(FileNotFoundError):
+        make_folder(tmp_path / "gone" / "one", below=tmp_path / "gone")
+    assert not (tmp_path / "gone").exists()
