@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.controller import finite_observation
-from baselines.estimation.filter import Motion, Sway, SwayFilter
+from baselines.estimation.filter import Motion, SwayEstimate, SwayFilter
 from baselines.estimation.settings import EstimatorSettings
 from crane_env.controller import Controller, check_controller
 from crane_env.observation import Observation
@@ -62,7 +62,7 @@ class Estimator:
         """Forgets the last episode; until readings say more, the crane was before as it is then."""
         self._asked.extend([0.0] * (self._asked.maxlen or 0))
         self._motions.clear()
-        self._past = self.sway = Sway(0.0, 0.0, 0.0)
+        self._past = self.sway = SwayEstimate(0.0, 0.0, 0.0)
         self.innovation = (0.0, 0.0)
 
     def estimate(self, read: Observation) -> Observation:
@@ -85,7 +85,7 @@ class Estimator:
         else:
             motions.extend([now] * (self._behind + 2))
             velocity = now.velocity + now.length * read.sway_rate
-            self._past = Sway(read.sway_angle, velocity, 0.0)
+            self._past = SwayEstimate(read.sway_angle, velocity, 0.0)
         sway, position = self._past, read.trolley_position
         for step in range(1, self._behind + 1):
             sway = self._filter.advance(sway, motions[step], motions[step + 1])

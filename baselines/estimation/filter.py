@@ -40,7 +40,7 @@ NODES = 100
 """Lengths of the grid between the hoist's limits."""
 
 
-class Sway(NamedTuple):
+class SwayEstimate(NamedTuple):
     """State of the filter.
 
     Attributes:
@@ -124,7 +124,7 @@ class SwayFilter:
         ratio = math.log(crane.cable_length_max / crane.cable_length_min)
         self._nodes_per_log = (NODES - 1) / ratio
 
-    def advance(self, sway: Sway, before: Motion, after: Motion) -> Sway:
+    def advance(self, sway: SwayEstimate, before: Motion, after: Motion) -> SwayEstimate:
         """The state one control period later, while the crane moves from `before` to `after`."""
         g, T = self._gravity, self._period
         velocity = 0.5 * (before.velocity + after.velocity)
@@ -135,23 +135,25 @@ class SwayFilter:
         wound = 0.25 * T * (before.rate + after.rate) / length
         slowed = 1.0 - wound + 0.5 * wound * wound  # by hoisting, in half a period
         e, p = sway.angle - lean, slowed * (sway.velocity - velocity)
-        return Sway(
+        return SwayEstimate(
             lean + c * e + s / (length * omega) * p,
             velocity + slowed * (c * p - length * omega * s * e),
             sway.disturbance,
         )
 
     def innovation(
-        self, sway: Sway, motion: Motion, angle: float, rate: float
+        self, sway: SwayEstimate, motion: Motion, angle: float, rate: float
     ) -> tuple[float, float]:
         """What the readings of sway angle [rad] and rate [rad/s] say beyond the state."""
         return angle - sway.angle, rate - self.rate(sway, motion)
 
-    def rate(self, sway: Sway, motion: Motion) -> float:
+    def rate(self, sway: SwayEstimate, motion: Motion) -> float:
         """Sway rate theta' [rad/s]."""
         return (sway.velocity - motion.velocity) / max(motion.length, self._shortest)
 
-    def correct(self, sway: Sway, motion: Motion, innovation: tuple[float, float]) -> Sway:
+    def correct(
+        self, sway: SwayEstimate, motion: Motion, innovation: tuple[float, float]
+    ) -> SwayEstimate:
         """The state in the light of an innovation."""
         length = max(motion.length, self._shortest)
         node = math.log(length / self._shortest) * self._nodes_per_log
@@ -160,7 +162,7 @@ class SwayFilter:
         K, L = self._gains[below], self._gains[below + 1]
         angle, rate = innovation
         upper, lower = share, 1.0 - share
-        return Sway(
+        return SwayEstimate(
             sway.angle
             + (lower * K[0] + upper * L[0]) * angle
             + (lower * K[1] + upper * L[1]) * rate,

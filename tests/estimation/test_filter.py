@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from baselines.estimation.estimator import Estimator
-from baselines.estimation.filter import Motion, Sway, SwayFilter, correction
+from baselines.estimation.filter import Motion, SwayEstimate, SwayFilter, correction
 from baselines.estimation.settings import EstimatorSettings
 from crane_env.observation import Observation
 from crane_env.parameters import CraneParameters
@@ -39,7 +39,7 @@ def test_the_state_advances_as_equation_1_with_a_force_on_the_payload(rate: floa
     times = PERIOD * np.arange(steps + 1)
     exact = solve_ivp(equation_1, (0.0, times[-1]), [0.01, 0.0], t_eval=times, rtol=1e-10).y
     motions = [Motion(v, length, r) for v, _, length, r in map(drive, times.tolist())]
-    sway = Sway(0.01, motions[0].velocity, disturbance)
+    sway = SwayEstimate(0.01, motions[0].velocity, disturbance)
     crane = SwayFilter(CRANE, EstimatorSettings())
     for step in range(steps):
         sway = crane.advance(sway, motions[step], motions[step + 1])

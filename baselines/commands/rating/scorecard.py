@@ -74,7 +74,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ScorecardPlan:
     """What is to be played.
 
     Attributes:
@@ -125,7 +125,7 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     if len(seeds) * len(names) * len(levels) * len(axes) > MOST_EPISODES:
         raise ValueError(f"There may be at most {MOST_EPISODES} episodes: ask for fewer seeds.")
     check_controllers(episode_specs(names, [OPERATOR], seeds[:1], setup))
-    plan = Plan(
+    plan = ScorecardPlan(
         controllers=names,
         severities=levels,
         cells={
@@ -141,7 +141,7 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
 
 
 def perform(
-    plan: Plan,
+    plan: ScorecardPlan,
     folder: ResultsFolder,
     report: Path,
     jobs: int,
