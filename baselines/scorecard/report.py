@@ -18,6 +18,9 @@ from baselines.scorecard.score import ACCEPTED_WITHIN, ENOUGH, WORST, Score, bre
 RESAMPLING_SEED = 21
 """Of the bootstrap intervals."""
 
+FEWEST_PAIRS = 5
+"""An effect size of fewer manoeuvres says nothing."""
+
 MODEL_ERRORS = ("cable-length-error", "payload-mass")
 """Axes on which a controller's model is wrong."""
 
@@ -167,7 +170,8 @@ def difference(one: Score, other: Score, rng: np.random.Generator) -> tuple[str,
     if found is None:
         return "-", "-"
     low, high = found.difference.interval
-    return f"{found.difference.mean:+.2f} [{low:+.2f}, {high:+.2f}]", f"{found.effect:+.1f}"
+    effect = f"{found.effect:+.1f}" if found.difference.count >= FEWEST_PAIRS else "-"
+    return f"{found.difference.mean:+.2f} [{low:+.2f}, {high:+.2f}]", effect
 
 
 def number(value: float) -> str:
