@@ -82,7 +82,9 @@ class SignalPath:
             self._suit(crane, episode.parameters)
             rigging = rigging_of(parts)
             if rigging is not None:
-                episode = episode._replace(slings=rigging.offset)
+                length = episode.start.cable_length - rigging.offset
+                hook = episode.start._replace(cable_length=length)
+                episode = episode._replace(start=hook, slings=rigging.offset)
             active = {part.name: part for part in parts if part.severity > 0.0}
             for name in active.keys() - self._parts.keys():
                 self._parts[name] = active[name].part(count)

@@ -78,7 +78,8 @@ class _Ground(ObstaclePart):
         self._obstacles: list[tuple[Obstacle, ...]] = [()] * count
 
     def begin(self, crane: int, spec: Ground, episode: Episode) -> None:
-        depth = episode.parameters.cable_length_max - spec.severity * spec.height
+        longest = episode.parameters.cable_length_max + episode.slings
+        depth = longest - spec.severity * spec.height
         depth = max(depth, place_of(episode.start).depth + episode.slings + CLEARANCE)
         self._obstacles[crane] = (Obstacle(left=-FARTHEST, right=FARTHEST, top=depth),)
 
@@ -117,8 +118,8 @@ class DoublePendulum(Imperfection):
     """The payload swings on slings below the hook, see `crane_env.plant.rigging`.
 
     The truth, and so metrics and task, is the payload's: cable length and sway of the straight line
-    from the sheave to its centre. Sensors see length and sway of the cable. The hook takes the
-    place of the payload at the start. The severity multiplies the offset.
+    from the sheave to its centre. Sensors see length and sway of the cable. An episode's start
+    places the payload; the hook is above it. The severity multiplies the offset.
 
     Attributes:
         hook_mass: of the payload mass [kg].

@@ -33,7 +33,7 @@ from crane_env.plant.model import (
     drum_stroke,
     hang,
     hook_of,
-    joint_positions,
+    joints_at,
 )
 from crane_env.plant.outcome import Outcome
 from crane_env.plant.rigging import Rigging
@@ -191,8 +191,8 @@ class VectorPlant:
         Raises:
             ValueError: a value outside its range; all cranes stay where they are.
         """
-        places = [
-            start.coordinates(self.cranes[index])
+        joints = [
+            joints_at(start, self.cranes[index], self._rigging)
             for index, start in zip(indices.tolist(), starts, strict=True)
         ]
         for index, walls in zip(indices.tolist(), obstacles or [()] * len(indices), strict=True):
@@ -200,7 +200,6 @@ class VectorPlant:
                 self._obstructed += bool(walls) - bool(self._obstacles[index])
                 self._obstacles[index] = tuple(walls)
                 self._outlines[index] = Outline.of(walls, self.cranes[index])
-        joints = [joint_positions(place, self._rigging) for place in places]
         position = np.array([place for place, _ in joints])
         velocity = np.array([rates for _, rates in joints])
         self._put(indices, position, velocity, position[:, DRUM])

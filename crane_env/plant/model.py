@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from crane_env.parameters import CraneParameters
 from crane_env.plant.drives import Stroke
 from crane_env.plant.rigging import Rigging
-from crane_env.plant.start import Coordinates
+from crane_env.plant.start import Start
 
 SETPOINT, DRIVE_ERROR, SWAY, REACH = range(4)
 """Places of the joints among positions and velocities."""
@@ -113,10 +113,20 @@ def hang(
     inertia[hook + 1] = slung * rigging.gyration_radius**2
 
 
-def joint_positions(start: Coordinates, rigging: Rigging | None) -> tuple[list[float], list[float]]:
-    """Positions and velocities of all joints; slings hang in line with the cable."""
-    position, velocity = list(start.position), list(start.velocity)
+def joints_at(
+    start: Start, parameters: CraneParameters, rigging: Rigging | None
+) -> tuple[list[float], list[float]]:
+    """Positions and velocities of all joints at a start; slings hang in line with the cable.
+
+    Raises:
+        ValueError: a value outside its range.
+    """
+    coordinates = start.coordinates(parameters)
+    position, velocity = list(coordinates.position), list(coordinates.velocity)
     if rigging is not None:
+        length = rigging.hook_length(parameters, position[REACH])
+        position[DRUM] *= length / position[REACH]
+        position[REACH] = length
         position.insert(REACH + 1, 0.0)
         velocity.insert(REACH + 1, 0.0)
     return position, velocity

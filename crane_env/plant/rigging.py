@@ -81,6 +81,7 @@ class Rigging:
                 f"The hook ({self.hook_mass:g} kg) is part of the payload's mass "
                 f"({p.payload_mass:g} kg) and must be lighter."
             )
+        self.hook_length(p, p.cable_length_initial)
         gyration = self.gyration_radius**2
         held = (p.payload_mass - self.hook_mass) * gyration / (gyration + self.offset**2)
         inertia = 1.0 / (self.hook_mass + held) + 1.0 / p.trolley_mass
@@ -92,6 +93,20 @@ class Rigging:
                 f"physics_step ({step:g} s) must be at most {longest:.3g} s for a hook of "
                 f"{self.hook_mass:g} kg with its payload {self.offset:g} m below it."
             )
+
+    def hook_length(self, parameters: CraneParameters, cable_length: float) -> float:
+        """From the sheave to the hook [m], where the payload hangs `cable_length` [m] below.
+
+        Raises:
+            ValueError: the hook would be above its limit switch.
+        """
+        length, shortest = cable_length - self.offset, parameters.cable_length_min
+        if length < shortest:
+            raise ValueError(
+                f"cable_length must be at least {shortest + self.offset:g} m with the payload "
+                f"{self.offset:g} m below the hook, not {cable_length:g} m."
+            )
+        return length
 
     def frequencies(self, parameters: CraneParameters, cable_length: float) -> tuple[float, float]:
         """Of small oscillations below a driven trolley, the slow one first [rad/s].

@@ -43,7 +43,7 @@ from crane_env.plant.model import (
     drum_stroke,
     hang,
     hook_of,
-    joint_positions,
+    joints_at,
 )
 from crane_env.plant.outcome import Outcome
 from crane_env.plant.rigging import Rigging
@@ -123,8 +123,7 @@ class Plant:
         Raises:
             ValueError: a value outside its range.
         """
-        place = start.coordinates(self._parameters)
-        position, velocity = joint_positions(place, self._rigging)
+        position, velocity = joints_at(start, self._parameters, self._rigging)
         self._obstacles = tuple(obstacles)
         self._outline = Outline.of(obstacles, self._parameters)
         self._put(position, velocity, position[DRUM])
@@ -251,16 +250,18 @@ class Plant:
 
         With a rigging, length and sway are those of the straight line from sheave to payload.
         """
-        setpoint, error, sway, reach, *swing, drum = self._position.tolist()
-        velocity = self._velocity.tolist()
-        setpoint_rate, error_rate, sway_rate, reach_rate, *swing_rate, drum_rate = velocity
+        position, velocity = self._position.tolist(), self._velocity.tolist()
+        if self._rigging is not None:
+            swing, swing_rate = position.pop(REACH + 1), velocity.pop(REACH + 1)
+        setpoint, error, sway, reach, drum = position
+        setpoint_rate, error_rate, sway_rate, reach_rate, drum_rate = velocity
         _, stiffness, damping = self._cable_gains.tolist()
         pull = cable_pull(stiffness, damping, reach, reach_rate, drum, drum_rate)
         state = CraneState(
             setpoint + error, setpoint_rate + error_rate, reach, reach_rate, sway, sway_rate
         )
         if self._rigging is not None:
-            state = self._rigging.payload(state, swing[0], swing_rate[0])
+            state = self._rigging.payload(state, swing, swing_rate)
         return state, max(0.0, pull)
 
     def cable(self) -> CraneState:

@@ -37,6 +37,7 @@ class Start(NamedTuple):
 
     Attributes:
         cable_length: sheave to payload, within the hoist limits [m]; None: the initial length.
+            Slings are part of it.
         sway_angle: clear of the girder [rad].
         sway_rate: [rad/s].
         trolley_position: within the limit switches [m].

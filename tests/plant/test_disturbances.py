@@ -130,6 +130,27 @@ def test_a_payload_that_is_snapped_off_the_ground_pulls_as_theory_says(rate: flo
     assert max(lifted(CraneParameters(), rate, 0.1 / rate + 1.0)) < 1.001 * peak
 
 
+def test_setting_down_and_lifting_gain_no_more_energy_than_the_hoist_gives() -> None:
+    crane = CraneParameters(physics_step=0.0005, control_period=0.001, hoist_speed=0.3)
+    plant = Plant(crane)
+    plant.reset(AT_REST, [FLOOR])
+
+    def energy() -> float:
+        state, drum = plant.state(), plant.unstretched_length
+        stretch = max(0.0, state.cable_length - drum)
+        elastic = 0.5 * crane.cable_stiffness / drum * stretch**2
+        moving = 0.5 * state.cable_rate**2 - crane.gravity * state.cable_length
+        return crane.payload_mass * moving + elastic
+
+    begin, given = energy(), 0.0
+    for rate in [0.3] * 700 + [0.0] * 200 + [-0.3] * 1200:
+        before = plant.cable_tension * plant.hoist_rate
+        plant.step(0.0, rate)
+        given -= 0.5 * (before + plant.cable_tension * plant.hoist_rate) * crane.control_period
+        assert energy() - begin <= given + 2.0
+    assert energy() - begin > 50.0, "it was lifted"
+
+
 def test_many_cranes_are_pushed_and_laden_bit_for_bit_as_each_alone() -> None:
     cranes = [CraneParameters(payload_mass=mass) for mass in (50.0, 100.0, 300.0)]
     many, alone = VectorPlant(cranes, threads=1), [Plant(crane) for crane in cranes]

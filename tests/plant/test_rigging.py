@@ -48,7 +48,7 @@ def test_small_oscillations_have_the_frequencies_of_the_eigenvalue_problem(
     expected = math.sqrt(squares[mode])
     assert SLINGS.frequencies(STIFF, length)[mode] == pytest.approx(expected, rel=1e-9)
     plant = Plant(STIFF, SLINGS)
-    plant.reset(Start(cable_length=length))
+    plant.reset(Start(cable_length=length + SLINGS.offset))
     theta, phi = 0.005 * shapes[mode] / np.abs(shapes[mode]).max()
     plant.data.qpos[2:5] = theta, plant.data.qpos[3], phi - theta
     seconds = max(4.0 * 2.0 * math.pi / expected, 3.0)
@@ -76,9 +76,9 @@ def test_with_its_payload_at_the_hook_it_is_nearly_the_plain_crane() -> None:
 
 def test_the_state_is_the_payloads_and_the_sensors_see_the_cable() -> None:
     plant = Plant(STIFF, SLINGS)
-    plant.reset(Start(cable_length=5.0, sway_angle=0.1))
-    assert plant.state().cable_length == pytest.approx(6.5)
-    assert plant.cable() == (0.0, 0.0, 5.0, 0.0, 0.1, 0.0)
+    plant.reset(Start(cable_length=6.5, sway_angle=0.1))
+    assert plant.state() == pytest.approx((0.0, 0.0, 6.5, 0.0, 0.1, 0.0))
+    assert plant.cable() == pytest.approx((0.0, 0.0, 5.0, 0.0, 0.1, 0.0))
     places = []
     for k in range(150):
         plant.step(math.cos(k / 10.0), 0.2)
@@ -135,7 +135,7 @@ def test_many_cranes_move_bit_for_bit_as_each_alone() -> None:
     cranes = [CraneParameters(payload_mass=mass) for mass in (60.0, 100.0, 300.0)]
     many = VectorPlant(cranes, threads=1, rigging=rigging)
     alone = [Plant(crane, rigging) for crane in cranes]
-    walls = [[Obstacle(left=-50.0, right=50.0, top=9.1)], [], []]
+    walls = [[Obstacle(left=-50.0, right=50.0, top=8.1)], [], []]
     many.reset(np.arange(3), [AT_REST] * 3, walls)
     for plant, wall in zip(alone, walls, strict=True):
         plant.reset(AT_REST, wall)
@@ -166,6 +166,10 @@ def test_many_cranes_move_bit_for_bit_as_each_alone() -> None:
     ("rigging", "sentence"),
     [
         (Rigging(hook_mass=100.0, offset=1.0, gyration_radius=0.4), "must be lighter"),
+        (
+            Rigging(hook_mass=10.0, offset=7.5, gyration_radius=1.0),
+            "at least 8.5 m with the payload",
+        ),
         (Rigging(hook_mass=1.0, offset=5.0, gyration_radius=0.1), "physics_step .* at most"),
     ],
 )
@@ -174,3 +178,11 @@ def test_what_cannot_be_simulated_is_refused(rigging: Rigging, sentence: str) ->
         Plant(CraneParameters(), rigging)
     with pytest.raises(ValueError, match=sentence):
         VectorPlant([CraneParameters()] * 2, rigging=rigging)
+
+
+def test_a_start_with_the_hook_above_its_limit_switch_is_refused() -> None:
+    plant = Plant(STIFF, SLINGS)
+    before = plant.state()
+    with pytest.raises(ValueError, match=r"cable_length must be at least 2.5 m"):
+        plant.reset(Start(cable_length=2.0))
+    assert plant.state() == before
