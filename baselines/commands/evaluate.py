@@ -78,7 +78,8 @@ class Options:
             nothing.
         ray: address of a Ray cluster to play on: HOST:PORT, auto, or local for one that is started
             here; None is processes on this machine.
-        controllers: names of controllers; package.module:factory for one of your own.
+        controllers: names of controllers, with a preset as l1@robust; package.module:factory for
+            one of your own.
         operators: who presses the buttons: table1 (all ten manoeuvres of the paper's Table I),
             table1:N (one of them), manoeuvre, random, stress, script:FILE (CSV or JSON), or
             recording:FILE (of this crane).

@@ -79,7 +79,8 @@ class Options:
     the finished tasks, and the same command then goes on from there.
 
     Attributes:
-        controllers: names of controllers; package.module:factory for one of your own.
+        controllers: names of controllers, with a preset as l1@robust; package.module:factory for
+            one of your own.
         skills: of the persons.
         tasks: families of tasks.
         seeds: of the tasks: numbers, or FIRST:END for all from FIRST to before END.
