@@ -21,7 +21,7 @@ Kind = tuple[str, int, bool]
 
 
 @dataclass(frozen=True)
-class Share:
+class Forecast:
     """Episodes of one kind.
 
     Attributes:
@@ -44,7 +44,7 @@ class Share:
         return (self.episodes - self.there) * self.duration
 
 
-def forecast(specs: Sequence[EpisodeSpec], folder: ResultsFolder, keep: Keep) -> list[Share]:
+def forecast(specs: Sequence[EpisodeSpec], folder: ResultsFolder, keep: Keep) -> list[Forecast]:
     """What a campaign would come to; nothing is written.
 
     Args:
@@ -57,18 +57,18 @@ def forecast(specs: Sequence[EpisodeSpec], folder: ResultsFolder, keep: Keep) ->
     """
     there = {result.spec.key for result in folder.load(specs, keep)}
     recorded = recorded_durations(folder)
-    shares: dict[Kind, list[EpisodeSpec]] = {}
+    parts: dict[Kind, list[EpisodeSpec]] = {}
     for spec in specs:
-        shares.setdefault(kind_of(spec), []).append(spec)
+        parts.setdefault(kind_of(spec), []).append(spec)
     return [
-        Share(
+        Forecast(
             kind,
             len(own),
             sum(spec.key in there for spec in own),
             recorded[kind] if kind in recorded else tried_duration(own[0]),
             kind in recorded,
         )
-        for kind, own in shares.items()
+        for kind, own in parts.items()
     ]
 
 

@@ -190,27 +190,27 @@ def file_campaign(options: Options) -> Campaign:
 
 def show_forecast(asked: Campaign, folder: ResultsFolder, jobs: int) -> None:
     """Prints what would be played and how long it takes."""
-    shares = forecast(asked.specs, folder, asked.keep)
+    parts = forecast(asked.specs, folder, asked.keep)
     table = require("rich.table", extra="results").Table()
     headings = ("controller", "steps", "task", "episodes", "there", "each [s]", "left")
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "controller" else "right")
-    for share in shares:
-        controller, steps, task = share.kind
+    for part in parts:
+        controller, steps, task = part.kind
         table.add_row(
             controller,
             str(steps),
             "yes" if task else "",
-            str(share.episodes),
-            str(share.there),
-            f"{share.duration:.3g}{'' if share.recorded else ' *'}",
-            told_duration(share.time_left / jobs),
+            str(part.episodes),
+            str(part.there),
+            f"{part.duration:.3g}{'' if part.recorded else ' *'}",
+            told_duration(part.time_left / jobs),
         )
     table_console().print(table)
-    if not all(share.recorded for share in shares):
+    if not all(part.recorded for part in parts):
         print("* from a short trial; all others as recorded.")
-    there = sum(share.there for share in shares)
-    left = told_duration(sum(share.time_left for share in shares) / jobs)
+    there = sum(part.there for part in parts)
+    left = told_duration(sum(part.time_left for part in parts) / jobs)
     print(
         f"{len(asked.specs)} episodes, {there} of them there already; the rest takes about {left} "
         f"on {jobs} processor(s)."
