@@ -9,7 +9,7 @@ from typing import Any
 from baselines.evaluation.provenance import package_versions
 from baselines.evaluation.tables import markdown_table
 from baselines.tuning.search import CLASSES, REFERENCE, Trial, best, merit
-from baselines.tuning.yardstick import Score
+from baselines.tuning.yardstick import TuningScore
 
 DIGITS = 4
 """Significant digits of the settings in a preset."""
@@ -26,7 +26,7 @@ training scores: they flatter what was tuned, a little."""
 
 
 def chosen(
-    searches: Mapping[str, Sequence[Trial]], bounds: Score
+    searches: Mapping[str, Sequence[Trial]], bounds: TuningScore
 ) -> dict[str, dict[str, Trial | None]]:
     """The presets' trials: controller, preset, trial; None where no trial is in the class."""
     return {
@@ -36,7 +36,7 @@ def chosen(
 
 
 def preset_data(
-    searches: Mapping[str, Sequence[Trial]], bounds: Score, seeds: Sequence[int]
+    searches: Mapping[str, Sequence[Trial]], bounds: TuningScore, seeds: Sequence[int]
 ) -> dict[str, dict[str, Any]]:
     """Presets as `baselines/presets.json` has them.
 
@@ -72,7 +72,7 @@ def short(settings: Any) -> Any:
 
 
 def markdown_report(
-    searches: Mapping[str, Sequence[Trial]], bounds: Score, seeds: Sequence[int]
+    searches: Mapping[str, Sequence[Trial]], bounds: TuningScore, seeds: Sequence[int]
 ) -> str:
     """The whole report in Markdown."""
     rows = []
@@ -93,7 +93,7 @@ def markdown_report(
     return "\n\n".join(parts) + "\n"
 
 
-def line(name: str, preset: str, trial: Trial | None, bounds: Score) -> tuple[str, ...]:
+def line(name: str, preset: str, trial: Trial | None, bounds: TuningScore) -> tuple[str, ...]:
     """A row of the report's table."""
     if trial is None or trial.score is None:
         missing = "no trial in this class" if trial is None else "diverged"

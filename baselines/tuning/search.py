@@ -27,7 +27,7 @@ from baselines.evaluation.episode_spec import digest
 from baselines.evaluation.provenance import code_identity
 from baselines.registry import make_controller
 from baselines.tuning.space import SPACES, Space
-from baselines.tuning.yardstick import DivergedError, Score, score
+from baselines.tuning.yardstick import DivergedError, TuningScore, score
 from crane_env import CraneParameters
 from crane_env.support.extras import require
 
@@ -59,13 +59,13 @@ class Trial:
     """
 
     settings: Mapping[str, Any]
-    score: Score | None
+    score: TuningScore | None
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> Trial:
         """Reads what `search` gave."""
         found = data["score"]
-        return cls(data["settings"], None if found is None else Score(**found))
+        return cls(data["settings"], None if found is None else TuningScore(**found))
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def search(task: SearchTask) -> list[dict[str, Any]]:
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     space = SPACES[task.name]
 
-    def tried(trial: Any) -> Score:
+    def tried(trial: Any) -> TuningScore:
         # The first has no numbers of its own: the defaults need not lie in the space.
         settings = space.settings(proposed(trial, space)) if len(finished(study)) else None
         controller = make_controller(task.name, parameters=task.crane, settings=settings)
@@ -143,7 +143,7 @@ def search(task: SearchTask) -> list[dict[str, Any]]:
             storage=storages.JournalStorage(
                 files.JournalFileBackend(str(task.folder / f"{task.name}.journal"))
             ),
-            directions=["minimize"] * len(Score._fields),
+            directions=["minimize"] * len(TuningScore._fields),
             load_if_exists=True,
         )
         while (number := len(finished(study))) < task.trials:
@@ -157,7 +157,7 @@ def search(task: SearchTask) -> list[dict[str, Any]]:
     return [
         {
             "settings": space.settings(one.params) if one.params else {},
-            "score": Score(*one.values)._asdict() if one.values else None,
+            "score": TuningScore(*one.values)._asdict() if one.values else None,
         }
         for one in finished(study)
     ]
@@ -180,7 +180,7 @@ def finished(study: Any) -> list[Any]:
     ]
 
 
-def best(trials: Sequence[Trial], bounds: Score, wanted: Class) -> Trial | None:
+def best(trials: Sequence[Trial], bounds: TuningScore, wanted: Class) -> Trial | None:
     """The best trial of a class; None if none is in it.
 
     Args:
@@ -191,7 +191,7 @@ def best(trials: Sequence[Trial], bounds: Score, wanted: Class) -> Trial | None:
     default = trials[0].score
     deaf = max(OBEDIENT, default.inching_error if default else 0.0)
 
-    def allowed(one: Score) -> bool:
+    def allowed(one: TuningScore) -> bool:
         return (
             one.sway <= HUNDREDTH * bounds.sway
             and (not wanted.effort or one.effort <= HUNDREDTH * bounds.effort)
@@ -204,6 +204,6 @@ def best(trials: Sequence[Trial], bounds: Score, wanted: Class) -> Trial | None:
     return min(scored, key=lambda pair: merit(pair[0], bounds))[1]
 
 
-def merit(found: Score, bounds: Score) -> float:
+def merit(found: TuningScore, bounds: TuningScore) -> float:
     """Mean of IAE and release drift, each as a share of `REFERENCE`'s."""
     return 0.5 * (found.IAE / bounds.IAE + found.release_drift / bounds.release_drift)

@@ -37,7 +37,7 @@ INCHING_STEPS = 600
 """Length of its episode [control periods]."""
 
 
-class Score(NamedTuple):
+class TuningScore(NamedTuple):
     """What a controller came to.
 
     Attributes:
@@ -59,7 +59,7 @@ class DivergedError(Exception):
     """The controller drove the crane until its simulation diverged."""
 
 
-def score(controller: Controller, seeds: Sequence[int], crane: CraneParameters) -> Score:
+def score(controller: Controller, seeds: Sequence[int], crane: CraneParameters) -> TuningScore:
     """Drives a controller through random manoeuvres and a short press.
 
     Args:
@@ -72,7 +72,7 @@ def score(controller: Controller, seeds: Sequence[int], crane: CraneParameters) 
     """
     env = _environment(crane)
     found = [_metrics(env, controller, seed=seed, operator="manoeuvre") for seed in seeds]
-    return Score(
+    return TuningScore(
         IAE=float(np.mean([one.IAE for one in found])),
         release_drift=float(np.mean([one.release_drift for one in found])),
         sway=float(np.percentile([one.max_sway for one in found], SWAY_PERCENTILE)),

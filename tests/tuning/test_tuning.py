@@ -15,11 +15,11 @@ from baselines.tuning import search as searching
 from baselines.tuning.report import markdown_report, preset_data
 from baselines.tuning.search import CLASSES, SearchTask, Trial, best, search
 from baselines.tuning.space import SPACES
-from baselines.tuning.yardstick import FIRST_SEED, DivergedError, Score, score
+from baselines.tuning.yardstick import FIRST_SEED, DivergedError, TuningScore, score
 from crane_env import CraneParameters
 
 TASK = SearchTask("lqr", 5, (FIRST_SEED,), CraneParameters(), Path())
-BOUNDS = Score(IAE=3.0, release_drift=1.5, sway=0.08, effort=0.3, inching_error=0.1)
+BOUNDS = TuningScore(IAE=3.0, release_drift=1.5, sway=0.08, effort=0.3, inching_error=0.1)
 
 
 @pytest.mark.parametrize("name", SPACES)
@@ -58,7 +58,7 @@ def test_an_interrupted_search_goes_the_way_of_an_undisturbed_one(
     again.folder.mkdir()
     calls = []
 
-    def interrupted(*arguments: object) -> Score:
+    def interrupted(*arguments: object) -> TuningScore:
         calls.append(arguments)
         if len(calls) in (1, 4):
             raise KeyboardInterrupt
@@ -77,7 +77,7 @@ def test_an_interrupted_search_goes_the_way_of_an_undisturbed_one(
 def test_a_trial_that_diverges_is_counted_and_never_a_preset(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def diverging(*arguments: object) -> Score:
+    def diverging(*arguments: object) -> TuningScore:
         raise DivergedError("over the girder")
 
     monkeypatch.setattr(searching, "score", diverging)

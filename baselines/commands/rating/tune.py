@@ -20,7 +20,7 @@ from baselines.evaluation.workers import keep_all, processes
 from baselines.tuning.report import markdown_report, preset_data
 from baselines.tuning.search import REFERENCE, SearchTask, Trial, search
 from baselines.tuning.space import SPACES
-from baselines.tuning.yardstick import FIRST_SEED, Score
+from baselines.tuning.yardstick import FIRST_SEED, TuningScore
 from crane_env.support.atomic_file import atomic_file
 from crane_env.support.checks import choice, whole
 from crane_env.support.extras import require
@@ -135,7 +135,7 @@ def tune(
         task.name: [Trial.of(one) for one in trials]
         for task, trials in zip(tasks, found, strict=True)
     }
-    bounds: Score | None = searches[REFERENCE][0].score
+    bounds: TuningScore | None = searches[REFERENCE][0].score
     assert bounds is not None, f"{REFERENCE} does not diverge"
     seeds = tasks[0].seeds
     report = output / "report.md"
