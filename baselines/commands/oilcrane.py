@@ -42,6 +42,11 @@ COMMANDS = {
     "study": Command(
         "study", "mpc,results", "lets persons bring payloads to places with every controller"
     ),
+    "leaderboard": Command(
+        "rating.leaderboard",
+        "mpc,policies,results",
+        "ranks controllers in classes of equal sway, against the limits of these classes",
+    ),
     "limit": Command(
         "rating.limit", "mpc,results", "computes how small the IAE of any policy can be, in classes"
     ),

@@ -74,13 +74,7 @@ class LimitValues:
 
 def limit_values(task: LimitTask) -> dict[str, Any]:
     """Computes the values of a task, as plain data."""
-    spec = EpisodeSpec(
-        controller=WATCHER,
-        operator=operator_program(task.operator),
-        seed=task.seed,
-        setup=Setup(crane=task.crane),
-    )
-    manoeuvre, crane_class = Manoeuvre.of(play(spec)), task.crane_class
+    manoeuvre, crane_class = asked(task), task.crane_class
 
     def replanned_error(preview: float) -> float:
         acceleration = replanned(manoeuvre, crane_class, preview)
@@ -104,6 +98,25 @@ def limit_values(task: LimitTask) -> dict[str, Any]:
         "intent": [solved(replanned_error, preview) for preview in task.previews],
         "tracked": solved(tracked_error) if task.previews else None,
     }
+
+
+def settled_error(task: LimitTask) -> float | None:
+    """The settled-class value of a task alone [m]; None if it was not solved."""
+    try:
+        return settled_value(asked(task), task.crane_class).error
+    except UnsolvedError:
+        return None
+
+
+def asked(task: LimitTask) -> Manoeuvre:
+    """The manoeuvre of a task."""
+    spec = EpisodeSpec(
+        controller=WATCHER,
+        operator=operator_program(task.operator),
+        seed=task.seed,
+        setup=Setup(crane=task.crane),
+    )
+    return Manoeuvre.of(play(spec))
 
 
 def motion_error(manoeuvre: Manoeuvre, acceleration: NDArray[np.float64]) -> float:
