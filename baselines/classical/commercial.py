@@ -101,15 +101,16 @@ class Commercial(Controller):
     def act(self, observation: NDArray[np.float64]) -> NDArray[np.float64]:
         """Acceleration of the command and the damping; see `Controller.act`."""
         seen = finite_observation(observation)
-        omega = math.sqrt(self._gravity / assumed_length(seen, self._length_min))
+        length = assumed_length(seen, self._length_min)
+        omega = math.sqrt(self._gravity / length)
         ramp = self._ramp.towards(seen.travel_reference)
-        self._past.append(ramp, seen.cable_length)
+        self._past.append(ramp, length)
         shaped = [one.amplitude * self._past.before(one.delay) for one in ZV]
         command, last = sum(shaped), self._command
         self._command = command
         wanted = (command - last) / self._period + RETURN * omega * (last - seen.trolley_velocity)
         if command == last == ramp:
-            wanted += 2.0 * self._damping * omega * seen.cable_length * seen.sway_rate
+            wanted += 2.0 * self._damping * omega * length * seen.sway_rate
         return np.array([self._limits.saturate(wanted, seen.trolley_velocity)])
 
 

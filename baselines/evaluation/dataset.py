@@ -132,7 +132,9 @@ def read(file: Path) -> Iterator[dict[str, Any]]:
     content = file.read_bytes()
     if _digest(content) != file.stem:
         return
-    table = parquet.read_table(pyarrow.BufferReader(content))
+    # Without threads: those of an interrupted reader may still be there when the process ends.
+    opened = parquet.ParquetFile(pyarrow.BufferReader(content), pre_buffer=False)
+    table = opened.read(use_threads=False)
     if (table.schema.metadata or {}).get(b"format") != FORMAT.encode():
         return
     controller = unquote(file.parent.name.removeprefix(PARTITION))

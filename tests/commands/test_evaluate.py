@@ -200,7 +200,7 @@ BAD_INPUT = {
     "controller": (("--controllers", "nobody"), "Unknown controller 'nobody'; valid: manual, lin"),
     "module": (("--controllers", "nowhere:nobody"), "'nowhere:nobody' cannot be imported"),
     "operator": (("--operators", "nobody"), "Unknown operator 'nobody'; valid: random, stress"),
-    "manoeuvre": (("--operators", "table1:11"), "valid: random, stress, manoeuvre, table1:1"),
+    "manoeuvre": (("--operators", "table1:11"), "manoeuvre, memoryless, table1:1"),
     "script": (("--operators", "script:none.csv"), "no button script 'none.csv'"),
     "preset": (("--parameters", "moon"), "must be a preset (paper, field), a JSON object or a fi"),
     "range": (("--parameters", '{"payload_mass": -1}'), "payload_mass must be a positive finite"),
