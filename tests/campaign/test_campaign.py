@@ -71,12 +71,16 @@ def workers_of(process: subprocess.Popen[str]) -> list[int]:
 
 
 def what_happened(folder: ResultsFolder) -> dict[str, dict[str, Any]]:
-    """Rows by their keys, without durations; none stands twice in the files."""
+    """Rows by their keys; none stands twice in the files.
+
+    Without durations, and without what foreign code could have read where it ran: a Ray worker has
+    more modules at hand.
+    """
     rows = [row for file in folder.episodes.files() for row in dataset.read(file)]
     assert len({row["key"] for row in rows}) == len(rows)
-    timed = ("act_", "wall_time", "attempts")
+    local = ("act_", "wall_time", "attempts", "read")
     return {
-        row["key"]: {name: row[name] for name in row if not name.startswith(timed)} for row in rows
+        row["key"]: {name: row[name] for name in row if not name.startswith(local)} for row in rows
     }
 
 
