@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import functools
+import signal
+import threading
 from collections import Counter
-from collections.abc import Callable, Sequence
-from contextlib import closing, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
@@ -240,9 +242,10 @@ class Batches:
             OSError: it cannot be written.
         """
         self._written = perf_counter()
-        for controller in list(self._waiting):
-            self._files.append(self._folder.save(self._waiting[controller]))
-            del self._waiting[controller]  # only now: another attempt may succeed
+        with unbroken():
+            for controller in list(self._waiting):
+                self._files.append(self._folder.save(self._waiting[controller]))
+                del self._waiting[controller]  # only now: another attempt may succeed
 
     def check(self) -> None:
         """Makes sure that what was written has not been deleted since.
@@ -256,6 +259,30 @@ class Batches:
                 "this run kept in it: they were deleted meanwhile, and the same command plays "
                 "those episodes again."
             )
+
+
+@contextmanager
+def unbroken() -> Iterator[None]:
+    """Lets an interrupt wait for the end of the block.
+
+    Python ignores what a signal raises inside a destructor, and pyarrow's writer has one: the
+    interrupt would be lost.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    caught: list[int] = []
+    before = {
+        number: signal.signal(number, lambda number, _: caught.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        if caught:
+            signal.raise_signal(caught[0])
 
 
 def index_values(

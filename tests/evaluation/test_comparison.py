@@ -7,6 +7,7 @@ import itertools
 import json
 import os
 import re
+import signal
 import time
 from pathlib import Path
 
@@ -17,7 +18,7 @@ import baselines.evaluation.episode_spec
 import baselines.evaluation.workers
 import crane_env
 from baselines.evaluation import provenance
-from baselines.evaluation.comparison import check_controllers, compare, index_values
+from baselines.evaluation.comparison import check_controllers, compare, index_values, unbroken
 from baselines.evaluation.episode_spec import (
     EpisodeSpec,
     Setup,
@@ -530,3 +531,17 @@ def test_index_values_keep_controllers_operators_and_seeds_apart(tmp_path: Path)
         found = values[result.spec.controller][result.spec.operator_name][result.spec.seed]
         assert found == metrics_of(result)["max_sway"]
     assert [list(row) for row in values.values()] == [["random", "table1:1"]] * 2
+
+
+def test_an_interrupt_while_results_are_written_waits_until_they_are() -> None:
+    done = []
+
+    def write() -> None:
+        with unbroken():
+            signal.raise_signal(signal.SIGINT)
+            done.append("written")
+
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert done == ["written"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
