@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import functools
-import signal
-import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
@@ -19,7 +17,7 @@ from numpy.typing import NDArray
 from baselines.evaluation import foreign_code
 from baselines.evaluation.episode_spec import EpisodeSpec, build_controller, check_settings, digest
 from baselines.evaluation.provenance import code_identity, git_state, machine, package_versions
-from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
+from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder, unbroken
 from baselines.evaluation.workers import Task, Workers, play_all, processes
 from crane_env.support.factory import FactoryError
 
@@ -259,30 +257,6 @@ class Batches:
                 "this run kept in it: they were deleted meanwhile, and the same command plays "
                 "those episodes again."
             )
-
-
-@contextmanager
-def unbroken() -> Iterator[None]:
-    """Lets an interrupt wait for the end of the block.
-
-    Python ignores what a signal raises inside a destructor, and pyarrow's writer has one: the
-    interrupt would be lost.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    caught: list[int] = []
-    before = {
-        number: signal.signal(number, lambda number, _: caught.append(number))
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-        if caught:
-            signal.raise_signal(caught[0])
 
 
 def index_values(

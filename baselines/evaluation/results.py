@@ -22,6 +22,8 @@ import json
 import math
 import os
 import re
+import signal
+import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -145,7 +147,7 @@ class ResultsFolder:
             OSError: the file cannot be written, or the folder is gone.
         """
         file = self.trajectory_file(spec)
-        with self.writing():
+        with self.writing(), unbroken():
             make_folder(file.parent, below=file.parents[1])
             trajectory.to_parquet(file)
             return file_digest(file)
@@ -269,6 +271,30 @@ class ResultsFolder:
             return keep == "metrics" or row["trajectory"] == file_digest(self.trajectory_file(spec))
         except OSError:
             return False
+
+
+@contextmanager
+def unbroken() -> Iterator[None]:
+    """Lets an interrupt wait for the end of the block.
+
+    Python ignores what a signal raises inside a destructor, and pyarrow's writer has one: the
+    interrupt would be lost.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    caught: list[int] = []
+    before = {
+        number: signal.signal(number, lambda number, _: caught.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        if caught:
+            signal.raise_signal(caught[0])
 
 
 def write_json(path: Path, data: Any, indent: int | None = 1) -> None:

@@ -18,7 +18,7 @@ import baselines.evaluation.episode_spec
 import baselines.evaluation.workers
 import crane_env
 from baselines.evaluation import provenance
-from baselines.evaluation.comparison import check_controllers, compare, index_values, unbroken
+from baselines.evaluation.comparison import check_controllers, compare, index_values
 from baselines.evaluation.episode_spec import (
     EpisodeSpec,
     Setup,
@@ -26,7 +26,7 @@ from baselines.evaluation.episode_spec import (
     episode_specs,
     play,
 )
-from baselines.evaluation.results import PARTIAL_AGE, EpisodeResult, ResultsFolder
+from baselines.evaluation.results import PARTIAL_AGE, EpisodeResult, ResultsFolder, unbroken
 from baselines.evaluation.workers import Task, perform, play_all
 from baselines.mpc.settings import MpcSettings
 from baselines.registry import make_controller
