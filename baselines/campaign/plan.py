@@ -23,7 +23,7 @@ import functools
 import itertools
 import math
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +32,7 @@ from typing import Any, TypeVar, cast, get_args
 from baselines.evaluation.episode_spec import MOST_EPISODES, EpisodeSpec, Setup
 from baselines.evaluation.results import Keep
 from baselines.mpc.settings import MpcSettings
-from crane_env import CraneParameters
+from crane_env import TASK_STEPS, CraneParameters
 from crane_env.environment.options import start_of
 from crane_env.imperfections.base import Imperfection
 from crane_env.imperfections.registry import make_imperfections
@@ -41,9 +41,6 @@ from crane_env.operators.registry import make_operator, operator_program
 from crane_env.operators.table1 import TABLE_1
 from crane_env.support import checks
 from crane_env.tasks.registry import make_task
-
-TASK_STEPS = 6000
-"""Longest time for a task [control periods], 120 s."""
 
 T = TypeVar("T")
 
@@ -266,6 +263,19 @@ def seed_range(given: Any) -> range:
     for number in range(low, high)[:1]:
         checks.seed(number)
     return range(low, high)
+
+
+def some_seeds(given: Iterable[Any], most: int) -> list[int]:
+    """Seeds of numbers and ranges, each once; no more of a long range is formed than may be.
+
+    Raises:
+        ValueError: one is neither, or there are more than `most`.
+    """
+    named = itertools.chain.from_iterable(map(seed_range, given))
+    seeds = list(dict.fromkeys(itertools.islice(named, most + 1)))
+    if len(seeds) > most:
+        raise ValueError(f"seeds must be at most {most}.")
+    return seeds
 
 
 @contextmanager

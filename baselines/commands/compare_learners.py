@@ -43,7 +43,7 @@ from crane_env import CraneParameters
 from crane_env.operators.registry import OperatorSpec
 from crane_env.operators.table1 import TABLE_1
 from crane_env.stage_cost import StageCost
-from crane_env.support.atomic_file import atomic_file
+from crane_env.support.atomic_file import write_text
 from crane_env.support.extras import require
 
 if TYPE_CHECKING:
@@ -172,8 +172,7 @@ def compare_learners(options: Options, runs: Sequence[Run], play: Play) -> None:
     if options.report.exists():
         before = options.report.read_text(encoding="utf-8").partition(MARKER)[0]
     text = "\n".join((before.rstrip(), "", MARKER, "", *sections))
-    with atomic_file(options.report) as partial:
-        partial.write_text(text.lstrip() + "\n", encoding="utf-8")
+    write_text(options.report, text.lstrip() + "\n")
     print(f"Report: {options.report}.")
     if runs:
         picture = options.report.parent / LEARNING_CURVES

@@ -48,7 +48,7 @@ from baselines.paper.stages import (
     stage_folder,
     timing_stage,
 )
-from crane_env.support.atomic_file import atomic_file
+from crane_env.support.atomic_file import write_text
 from crane_env.support.extras import require
 
 PROGRAM = "oilcrane reproduce"
@@ -188,8 +188,7 @@ def play_behind_bar(
 
 def write(reproduction: Reproduction, options: Options) -> None:
     """Writes report and data."""
-    with atomic_file(report_file(options)) as partial:
-        partial.write_text(markdown_report(reproduction), encoding="utf-8")
+    write_text(report_file(options), markdown_report(reproduction))
     write_json(data_file(options), plain_data(reproduction))
 
 

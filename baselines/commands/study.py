@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from baselines.campaign.plan import seed_range
+from baselines.campaign.plan import some_seeds
 from baselines.commands.evaluate import crane_parameters
 from baselines.commands.terminal import FailedError, Job, failure_lines, progress, run
 from baselines.evaluation.comparison import check_controllers, compare, index_values
@@ -45,7 +45,7 @@ from baselines.study.sensitivity import Variation, delays, variations
 from crane_env.operators.person.person import PERSONS, TRAINED
 from crane_env.operators.registry import operator_program
 from crane_env.operators.table1 import TABLE_1
-from crane_env.support.atomic_file import atomic_file
+from crane_env.support.atomic_file import write_text
 from crane_env.support.checks import whole
 from crane_env.support.extras import require
 
@@ -161,10 +161,7 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
     together = whole("tasks_per_person", options.tasks_per_person, 1)
     crane = crane_parameters(options.parameters, "parameters")
     setup = Setup(crane=crane, max_steps=round(TIME_LIMIT / crane.control_period))
-    given = itertools.chain.from_iterable(map(seed_range, options.seeds))
-    seeds = list(dict.fromkeys(itertools.islice(given, MOST_TASKS + 1)))
-    if len(seeds) > MOST_TASKS:
-        raise ValueError(f"seeds must be at most {MOST_TASKS}.")
+    seeds = some_seeds(options.seeds, MOST_TASKS)
     if len({seed // together for seed in seeds}) < 2:
         raise ValueError(
             f"seeds must give at least two persons, of {together} tasks each, to form intervals of."
@@ -218,8 +215,7 @@ def perform(
         )
     results = {result.spec.key: result for result in played}
     found = findings(study, results)
-    with atomic_file(report) as partial:
-        partial.write_text(markdown_report(found), encoding="utf-8")
+    write_text(report, markdown_report(found))
     print(f"Report: {report}.")
     drawn = draw(figures(found, folder), formats)
     print(f"Results: {', '.join(map(str, (folder.episodes.path, *drawn.files)))}.")

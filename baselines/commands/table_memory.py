@@ -24,7 +24,7 @@ from baselines.mpc.prediction.cable import hoist_stop_time
 from baselines.mpc.settings import MpcSettings
 from baselines.mpc.tabulated import AdaptiveTable, LengthGrid, LengthRateGrid, TimeVaryingTable
 from crane_env.parameters import CraneParameters
-from crane_env.support.atomic_file import atomic_file
+from crane_env.support.atomic_file import write_text
 from crane_env.support.extras import require
 
 if TYPE_CHECKING:
@@ -217,7 +217,6 @@ def write(file: Path) -> None:
     page = file.read_text(encoding="utf-8")
     page = with_table(page, "tabulated", markdown(tabulated, LENGTH_HEADS))
     page = with_table(page, "tabulated-ltv", markdown(tabulated_ltv, LENGTH_RATE_HEADS))
-    with atomic_file(file) as partial:
-        partial.write_text(page, encoding="utf-8")
+    write_text(file, page)
     save_figure(error_figure(tabulated, tabulated_ltv), file.with_suffix(".png"), "png")
     print(f"{file} and its figure are up to date.")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from baselines.evaluation import foreign_code
 from baselines.evaluation.episode_spec import EpisodeSpec, build_controller, check_settings, digest
 from baselines.evaluation.provenance import code_identity, git_state, machine, package_versions
-from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder, unbroken
+from baselines.evaluation.results import EpisodeResult, Keep, ResultsFolder
 from baselines.evaluation.workers import Task, Workers, play_all, processes
 from crane_env.support.factory import FactoryError
 
@@ -240,10 +240,9 @@ class Batches:
             OSError: it cannot be written.
         """
         self._written = perf_counter()
-        with unbroken():
-            for controller in list(self._waiting):
-                self._files.append(self._folder.save(self._waiting[controller]))
-                del self._waiting[controller]  # only now: another attempt may succeed
+        for controller in list(self._waiting):
+            self._files.append(self._folder.save(self._waiting[controller]))
+            del self._waiting[controller]  # only now: another attempt may succeed
 
     def check(self) -> None:
         """Makes sure that what was written has not been deleted since.

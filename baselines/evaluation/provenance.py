@@ -70,6 +70,14 @@ def machine() -> dict[str, Any]:
     }
 
 
+def made_with() -> str:
+    """Machine and versions in a line, for a report."""
+    return "; ".join(
+        ", ".join(f"{name} {value}" for name, value in facts.items())
+        for facts in (machine(), package_versions())
+    )
+
+
 def git_state() -> dict[str, Any] | None:
     """Commit that the code was taken from, and whether it was changed since.
 

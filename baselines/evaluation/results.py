@@ -41,7 +41,7 @@ from crane_env.episode.trajectory import Trajectory
 from crane_env.imperfections.base import Imperfection
 from crane_env.imperfections.registry import PARTS, SCENARIOS, make_imperfections, scaled
 from crane_env.parameters import PRESETS
-from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file, make_folder
+from crane_env.support.atomic_file import PARTIAL_SUFFIX, atomic_file, make_folder, write_text
 from crane_env.support.extras import require
 
 PARTIAL_AGE = 60.0
@@ -147,7 +147,7 @@ class ResultsFolder:
             OSError: the file cannot be written, or the folder is gone.
         """
         file = self.trajectory_file(spec)
-        with self.writing(), unbroken():
+        with self.writing():
             make_folder(file.parent, below=file.parents[1])
             trajectory.to_parquet(file)
             return file_digest(file)
@@ -254,9 +254,10 @@ class ResultsFolder:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Says in one sentence which folder could not be written, and why."""
+        """Lets interrupts wait, and says in one sentence what could not be written, and why."""
         try:
-            yield
+            with unbroken():
+                yield
         except OSError as error:
             why = os.strerror(error.errno) if error.errno else str(error)  # pyarrow's is a story
             raise OSError(
@@ -309,8 +310,7 @@ def write_json(path: Path, data: Any, indent: int | None = 1) -> None:
         OSError: the file cannot be written.
     """
     text = json.dumps(data, indent=indent, allow_nan=False)
-    with atomic_file(path) as partial:
-        partial.write_text(text + "\n", encoding="utf-8")
+    write_text(path, text + "\n")
 
 
 def file_digest(path: Path) -> str:

@@ -12,13 +12,18 @@ what the manoeuvres themselves vary by.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crane_env.episode.metrics import Metrics
 from crane_env.support.extras import require
+
+SWAY_SHARE = 95.0
+"""Percentile of the manoeuvres' largest angles that counts as a controller's sway [%]."""
 
 BATCH = 1000
 """So many resamples are drawn at once, to save memory."""
@@ -149,6 +154,11 @@ def share_interval(successes: int, trials: int, confidence: float = 0.95) -> Int
     test = require("scipy.stats", extra="results").binomtest(successes, trials)
     low, high = test.proportion_ci(confidence, method="wilson")
     return Interval(float(low), float(high))
+
+
+def sway_of(metrics: Sequence[Metrics]) -> float:
+    """Sway of a controller [rad], from the metrics of its manoeuvres."""
+    return float(np.percentile([one.max_sway for one in metrics], SWAY_SHARE))
 
 
 def _check_confidence(confidence: float) -> None:

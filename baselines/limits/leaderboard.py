@@ -15,15 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.evaluation.results import EpisodeResult
+from baselines.evaluation.statistics import sway_of
 from baselines.evaluation.tables import markdown_table, mean_and_deviation
 from baselines.limits.least_error import CraneClass
 from crane_env.episode.metrics import Metrics
 
 SWAYS = (3.0, 4.0, 5.0, math.inf)
 """Of the classes [deg]."""
-
-SWAY_SHARE = 95.0
-"""Percentile of the manoeuvres' largest angles that counts as a controller's sway [%]."""
 
 MARGIN = 1.05
 """A controller may exceed its class's sway by so much: limits of sway are soft on a real crane."""
@@ -57,11 +55,6 @@ class Standing:
     def times_limit(self) -> float:
         """Mean IAE over the mean settled-class value."""
         return float(self.index("IAE").mean() / np.nanmean(self.values))
-
-
-def sway_of(metrics: Sequence[Metrics]) -> float:
-    """Sway of a controller [rad]."""
-    return float(np.percentile([one.max_sway for one in metrics], SWAY_SHARE))
 
 
 def class_of(metrics: Sequence[Metrics], acceleration_max: float) -> CraneClass:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.evaluation.provenance import machine, package_versions
+from baselines.evaluation.provenance import made_with
 from baselines.evaluation.tables import markdown_table, mean_and_deviation
 from baselines.limits.least_error import CraneClass
 from baselines.limits.values import LimitTask, LimitValues
@@ -78,9 +78,7 @@ def limit_report(findings: LimitFindings) -> str:
             picture,
             intent_table(findings),
         ]
-    facts = ", ".join(f"{key} {value}" for key, value in machine().items())
-    versions = ", ".join(f"{key} {value}" for key, value in package_versions().items())
-    parts += ["## Made with", f"{findings.unsolved} programs unsolved; {facts}; {versions}."]
+    parts += ["## Made with", f"{findings.unsolved} programs unsolved; {made_with()}."]
     return "\n\n".join(parts) + "\n"
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.evaluation.provenance import machine, package_versions
+from baselines.evaluation.provenance import made_with
 from baselines.evaluation.statistics import mean_interval
 from baselines.evaluation.tables import markdown_table
 from baselines.scorecard.plan import FACTORS, PEER
@@ -56,9 +56,7 @@ def markdown_report(card: Card) -> str:
     ]
     if card.peer:
         parts += [f"## The factors of {PEER}", factors(card), peer_table(card)]
-    machine_facts = ", ".join(f"{key} {value}" for key, value in machine().items())
-    versions = ", ".join(f"{key} {value}" for key, value in package_versions().items())
-    parts += ["## Made with", f"{machine_facts}; {versions}."]
+    parts += ["## Made with", f"{made_with()}."]
     return "\n\n".join(parts) + "\n"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from baselines.evaluation.provenance import machine, package_versions
+from baselines.evaluation.provenance import made_with
 from baselines.evaluation.statistics import Interval
 from baselines.evaluation.tables import markdown_table
 from baselines.study.difficulty import Fit, fit_line
@@ -47,9 +47,7 @@ def markdown_report(findings: Findings) -> str:
         ]
     if findings.varied:
         parts += ["## Sensitivity to what was assumed", SENSITIVITY, varied_table(findings.varied)]
-    machine_facts = ", ".join(f"{key} {value}" for key, value in machine().items())
-    versions = ", ".join(f"{key} {value}" for key, value in package_versions().items())
-    parts += ["## Made with", f"{machine_facts}; {versions}."]
+    parts += ["## Made with", f"{made_with()}."]
     return "\n\n".join(parts) + "\n"
 
 

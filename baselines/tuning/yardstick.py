@@ -21,14 +21,14 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 
+from baselines.evaluation.statistics import sway_of
 from crane_env import CraneParameters, Metrics, run_episode
 from crane_env.controller import Controller
+from crane_env.episode.stop_contract import rest_of
 from crane_env.operators.base import Press, press_events
 
 FIRST_SEED = 10_000
 """Training manoeuvres have seeds from here on; those of tests and comparisons lie below."""
-
-SWAY_PERCENTILE = 95.0
 
 INCHING = Press("forward", 1.0, 1.2)
 """The short press [s]."""
@@ -75,9 +75,9 @@ def score(controller: Controller, seeds: Sequence[int], crane: CraneParameters) 
     return TuningScore(
         IAE=float(np.mean([one.IAE for one in found])),
         release_drift=float(np.mean([one.release_drift for one in found])),
-        sway=float(np.percentile([one.max_sway for one in found], SWAY_PERCENTILE)),
+        sway=sway_of(found),
         effort=float(np.mean([one.rms_acceleration for one in found])),
-        inching_error=_inching_error(env, controller, crane),
+        inching_error=_inching_error(env, controller),
     )
 
 
@@ -96,9 +96,7 @@ def _metrics(
     return metrics
 
 
-def _inching_error(
-    env: gymnasium.Env[Any, Any], controller: Controller, crane: CraneParameters
-) -> float:
+def _inching_error(env: gymnasium.Env[Any, Any], controller: Controller) -> float:
     trajectory = run_episode(
         env,
         controller,
@@ -106,9 +104,6 @@ def _inching_error(
         options={"operator": press_events([INCHING])},
         max_steps=INCHING_STEPS,
     )
-    period = crane.control_period
-    asked = trajectory.travel_reference.sum() * period
-    # Over a whole swing, so that what is left of it does not count.
-    swing = round(crane.sway_period(crane.cable_length_initial) / period)
-    moved = trajectory.payload_position[-swing:].mean() - trajectory.payload_position[0]
+    asked = trajectory.travel_reference.sum() * trajectory.parameters.control_period
+    moved = rest_of(trajectory) - trajectory.payload_position[0]
     return float(abs(moved - asked) / asked)

@@ -10,7 +10,7 @@ from pathlib import Path
 from crane_env.episode.trajectory import MEANINGS, Trajectory
 from crane_env.operators.recording import ENVIRONMENT, FORMAT
 from crane_env.support import checks
-from crane_env.support.atomic_file import atomic_file
+from crane_env.support.atomic_file import write_text
 
 NAME = "README.md"
 """Of the card, beside the recordings."""
@@ -99,8 +99,7 @@ def write_data_card(folder: str | Path) -> Path:
             f"| `{name}` | {said['unit'] or 'true or false'} |" for name, said in MEANINGS.items()
         ),
     )
-    with atomic_file(card) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(card, text)
     return card
 
 

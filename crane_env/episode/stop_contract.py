@@ -183,12 +183,17 @@ def stop_contract(
     return StopContract.of(tuple(stops), failures)
 
 
+def rest_of(played: Trajectory) -> float:
+    """Where the payload comes to rest [m]: its mean position over the last sway period."""
+    turn = played.parameters.sway_period(float(played.cable_length[-1]))
+    return float(played.payload_position[-round(turn / played.parameters.control_period) :].mean())
+
+
 def _stop(played: Trajectory, hold: float, length: float, hoist: str | None) -> PressOutcome:
     period, position = played.parameters.control_period, played.payload_position
     release = release_step(played.travel_reference)
     assert release is not None, "a press has a release"
-    turn = played.parameters.sway_period(float(played.cable_length[-1]))
-    rest = float(position[-round(turn / period) :].mean())
+    rest = rest_of(played)
     unsettled = np.flatnonzero(np.abs(position[release:] - rest) > SETTLING_BAND)
     return PressOutcome(
         hold=hold,

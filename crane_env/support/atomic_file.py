@@ -52,6 +52,16 @@ def atomic_file(target: str | os.PathLike[str]) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
+def write_text(target: str | os.PathLike[str], text: str) -> None:
+    """Writes a text file in UTF-8, which appears whole or not at all.
+
+    Raises:
+        OSError: as `atomic_file`.
+    """
+    with atomic_file(target) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
 def make_folder(folder: Path, below: Path) -> None:
     """Makes a folder and those on the way to it, on the disk too, if they are not there.
 

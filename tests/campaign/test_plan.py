@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from baselines.campaign.plan import TASK_STEPS, campaign, read_campaign
+from baselines.campaign.plan import TASK_STEPS, campaign, read_campaign, some_seeds
 from crane_env import CraneParameters
 from crane_env.imperfections.registry import make_imperfections
 
@@ -94,3 +94,9 @@ def test_a_file_that_is_none_is_said_so(tmp_path: Path) -> None:
     (binary := tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(ValueError, match="it is not text in UTF-8"):
         read_campaign(binary)
+
+
+def test_more_seeds_than_may_be_are_refused_before_they_are_formed() -> None:
+    assert some_seeds([3, "1:4", "2"], 3) == [3, 1, 2]
+    with pytest.raises(ValueError, match="seeds must be at most 3"):
+        some_seeds(["0:1000000000000"], 3)

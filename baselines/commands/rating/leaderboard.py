@@ -44,7 +44,7 @@ from baselines.limits.values import LimitTask, settled_error
 from baselines.registry import make_controller
 from crane_env import CraneParameters
 from crane_env.episode.stop_contract import stop_contract
-from crane_env.support.atomic_file import atomic_file
+from crane_env.support.atomic_file import write_text
 from crane_env.support.extras import require
 
 PROGRAM = "oilcrane leaderboard"
@@ -210,8 +210,7 @@ def rank(
         for name, metrics in played.items()
     ]
     head = INTRODUCTION.format(count=len(seeds), operator=OPERATOR)
-    with atomic_file(report) as partial:
-        partial.write_text(leaderboard_report(standings, head), encoding="utf-8")
+    write_text(report, leaderboard_report(standings, head))
     print(f"Leaderboard: {report}.")
     drawn = draw({report.with_name(FIGURE): lambda: pareto_figure(standings)}, formats)
     if failures := [*failure_lines(results), *drawn.failures]:

@@ -12,10 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.campaign.plan import seed_range
+from baselines.campaign.plan import some_seeds
 from baselines.commands.evaluate import crane_parameters
 from baselines.commands.terminal import FailedError, Job, check_writable, progress, run
 from baselines.evaluation.drawing import Format, draw
+from baselines.evaluation.episode_spec import MOST_EPISODES
 from baselines.evaluation.results import write_json
 from baselines.evaluation.workers import keep_all, processes
 from baselines.limits.figures import intent_figure
@@ -24,7 +25,7 @@ from baselines.limits.report import FIGURE, LimitFindings, limit_report
 from baselines.limits.values import LimitTask, limit_values, read_values
 from crane_env.operators.person.operator import PersonOperator
 from crane_env.operators.registry import make_operator
-from crane_env.support.atomic_file import atomic_file
+from crane_env.support.atomic_file import write_text
 from crane_env.support.checks import real, whole
 from crane_env.support.extras import require
 
@@ -102,7 +103,7 @@ def limit_tasks(options: Options) -> list[LimitTask]:
         ValueError: a value out of range, or nothing to compute.
     """
     crane = crane_parameters(options.parameters, "parameters")
-    seeds = list(dict.fromkeys(seed for given in options.seeds for seed in seed_range(given)))
+    seeds = some_seeds(options.seeds, MOST_EPISODES)
     classes = [
         CraneClass(acceleration, math.radians(sway))
         for acceleration in dict.fromkeys(options.accelerations)
@@ -141,8 +142,7 @@ def compute(
     except KeyboardInterrupt:
         raise KeyboardInterrupt(KEPT.format(output)) from None
     findings = LimitFindings.of(tasks, read_values(found))
-    with atomic_file(report) as partial:
-        partial.write_text(limit_report(findings), encoding="utf-8")
+    write_text(report, limit_report(findings))
     write_json(
         output / "values.json",
         [

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.campaign.plan import seed_range
+from baselines.campaign.plan import some_seeds
 from baselines.commands.evaluate import crane_parameters
 from baselines.commands.terminal import FailedError, Job, failure_lines, progress, run
 from baselines.evaluation.comparison import check_controllers, compare
@@ -25,7 +25,7 @@ from baselines.scorecard.plan import AXES, LEVELS, OPERATOR, cell_specs, peer_sp
 from baselines.scorecard.report import Card, markdown_report
 from baselines.scorecard.score import score_of
 from crane_env.imperfections.base import MOST_SEVERE
-from crane_env.support.atomic_file import atomic_file
+from crane_env.support.atomic_file import write_text
 from crane_env.support.checks import choice, whole, within
 from crane_env.support.extras import require
 
@@ -120,8 +120,7 @@ def prepare(options: Options, command: Sequence[str]) -> Job:
         within("highest", options.highest, 0.01, MOST_SEVERE),
     )
     cranes = whole("cranes", options.cranes, 0, MOST_EPISODES)
-    given = itertools.chain.from_iterable(map(seed_range, options.seeds))
-    seeds = list(dict.fromkeys(itertools.islice(given, MOST_EPISODES + 1)))
+    seeds = some_seeds(options.seeds, MOST_EPISODES)
     if len(seeds) * len(names) * len(levels) * len(axes) > MOST_EPISODES:
         raise ValueError(f"There may be at most {MOST_EPISODES} episodes: ask for fewer seeds.")
     check_controllers(episode_specs(names, [OPERATOR], seeds[:1], setup))
@@ -173,8 +172,7 @@ def perform(
         ],
         episodes=len(next(iter(plan.cells.values()))[0][0]),
     )
-    with atomic_file(report) as partial:
-        partial.write_text(markdown_report(card), encoding="utf-8")
+    write_text(report, markdown_report(card))
     print(f"Report: {report}.")
     figure = functools.partial(scorecard_figure, card.scores, card.severities)
     drawn = draw({folder.figures / "scorecard": figure}, formats)

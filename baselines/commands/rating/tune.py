@@ -21,7 +21,7 @@ from baselines.tuning.report import markdown_report, preset_data
 from baselines.tuning.search import REFERENCE, SearchTask, Trial, search
 from baselines.tuning.space import SPACES
 from baselines.tuning.yardstick import FIRST_SEED, TuningScore
-from crane_env.support.atomic_file import atomic_file
+from crane_env.support.atomic_file import write_text
 from crane_env.support.checks import choice, whole
 from crane_env.support.extras import require
 
@@ -139,8 +139,7 @@ def tune(
     assert bounds is not None, f"{REFERENCE} does not diverge"
     seeds = tasks[0].seeds
     report = output / "report.md"
-    with atomic_file(report) as partial:
-        partial.write_text(markdown_report(searches, bounds, seeds), encoding="utf-8")
+    write_text(report, markdown_report(searches, bounds, seeds))
     made = preset_data(searches, bounds, seeds)
     merged = {name: {**before.get(name, {}), **made.get(name, {})} for name in {**before, **made}}
     write_json(presets, merged)
